@@ -77,8 +77,6 @@ pub enum FmuProblem {
     Description(String),
     /// It offers no interface at all.
     NoCoSimulation,
-    /// The references that it carries cannot be read; with the reason.
-    References(String),
     /// Its model identifier is no file name, so it names no library.
     ModelIdentifier(String),
     /// No shared library for this platform.
@@ -132,7 +130,6 @@ impl fmt::Display for FmuProblem {
             }
             Self::Description(reason) => write!(f, "modelDescription.xml: {reason}"),
             Self::NoCoSimulation => f.write_str("has no co-simulation interface, nor any other"),
-            Self::References(reason) => write!(f, "its references: {reason}"),
             Self::ModelIdentifier(name) => {
                 write!(f, "modelIdentifier is {name:?}, which names no file, so there is no library")
             }

@@ -11,7 +11,6 @@
 //! whole                files that are written whole or not at all
 //! isolation            FMUs in a child process, which may crash
 //! recording            the rows of a run; CSV
-//! references           inputs and results that an FMU carries, for tools to check themselves
 //! validate             the defects of an FMU: archive, schema, rules, symbols, a trial
 //! outlines             the edges of safe sets in a plane
 //! coupling             several FMUs: system file, order, fixed-step master
@@ -44,7 +43,6 @@ pub mod page;
 pub mod pictures;
 pub mod plot;
 pub mod recording;
-pub mod references;
 pub mod report;
 pub mod reproduce;
 pub mod text;

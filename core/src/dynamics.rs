@@ -4,7 +4,6 @@ use nalgebra::{SMatrix, SVector};
 
 use crate::elementary;
 use crate::error::{Error, length};
-use crate::jet::Tangent;
 use crate::scalar::Scalar;
 
 /// A plant `ẋ = f(x) + g(x) u` with `NX` states and `NU` inputs.
@@ -301,13 +300,6 @@ pub trait DynPlant: Send {
     ///
     /// A slice of the wrong length.
     fn rk4_step(&self, x: &mut [f64], u: &[f64], dt: f64) -> Result<(), Error>;
-
-    /// Writes the rate of each state per second at the state `x` and the input `u`, and its change along their direction.
-    ///
-    /// # Errors
-    ///
-    /// A slice of the wrong length.
-    fn rates(&self, x: &[Tangent<f64>], u: &[Tangent<f64>], rates: &mut [Tangent<f64>]) -> Result<(), Error>;
 }
 
 /// The first `N` of the numbers `x`, as an array has them: nalgebra's own function copies a number that is not known beforehand.
@@ -321,7 +313,7 @@ pub(crate) fn column<T: Scalar, const N: usize>(x: &[T]) -> SVector<T, N> {
 /// # Errors
 ///
 /// A slice of another length than the one beside it.
-pub fn check_lengths<T>((x, states): (&[T], usize), (u, inputs): (&[T], usize)) -> Result<(), Error> {
+pub fn check_lengths((x, states): (&[f64], usize), (u, inputs): (&[f64], usize)) -> Result<(), Error> {
     length("x", x.len(), states)?;
     length("u", u.len(), inputs)
 }
@@ -346,14 +338,6 @@ where
         check_lengths((x, NX), (u, NU))?;
         let next = rk4_step(&self.0, &column(x), &column(u), dt);
         x.copy_from_slice(next.as_slice());
-        Ok(())
-    }
-
-    fn rates(&self, x: &[Tangent<f64>], u: &[Tangent<f64>], rates: &mut [Tangent<f64>]) -> Result<(), Error> {
-        check_lengths((x, NX), (u, NU))?;
-        length("rates", rates.len(), NX)?;
-        let (x, u) = (column(x), column(u));
-        rates.copy_from_slice(self.0.derivative(&x, &u).as_slice());
         Ok(())
     }
 }

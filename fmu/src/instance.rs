@@ -16,10 +16,8 @@
 mod access;
 mod arrays;
 mod derivative;
-mod exchange;
 mod places;
 
-use punctual_core::jet::Tangent;
 use punctual_modeldescription::{BaseType, Causality, Integer, Plain, Real, Variability, VariableKind};
 
 use crate::block::{self, Block, BlockState, Values};
@@ -52,28 +50,15 @@ impl Mode {
     pub const STEP: Self = Self(4);
     /// After `fmi2Terminate`.
     pub const TERMINATED: Self = Self(8);
-    /// At an event, in model exchange.
-    pub const EVENT: Self = Self(16);
-    /// Between events, in model exchange.
-    pub const CONTINUOUS: Self = Self(32);
-    /// None of them.
-    pub const NONE: Self = Self(0);
     /// All of them.
-    pub const ANY: Self = Self(63);
+    pub const ANY: Self = Self(15);
 
     pub(crate) const fn or(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
     /// Each mode by itself.
-    pub const EACH: [Self; 6] = [
-        Self::INSTANTIATED,
-        Self::INITIALIZATION,
-        Self::STEP,
-        Self::TERMINATED,
-        Self::EVENT,
-        Self::CONTINUOUS,
-    ];
+    pub const EACH: [Self; 4] = [Self::INSTANTIATED, Self::INITIALIZATION, Self::STEP, Self::TERMINATED];
 
     /// Whether `self` is among `modes`.
     pub fn is_in(self, modes: Self) -> bool {
@@ -87,8 +72,6 @@ impl Mode {
             Self::INITIALIZATION => "initialization",
             Self::STEP => "step",
             Self::TERMINATED => "terminated",
-            Self::EVENT => "event",
-            Self::CONTINUOUS => "continuous time",
             _ => "several modes",
         }
     }
@@ -113,67 +96,33 @@ pub enum Call {
     DoStep,
     /// `fmi2GetDirectionalDerivative`; `fmi3GetAdjointDerivative` too.
     GetDirectionalDerivative,
-    /// `fmi2EnterEventMode`.
-    EnterEventMode,
-    /// `fmi2NewDiscreteStates`, `fmi3UpdateDiscreteStates`.
-    UpdateDiscreteStates,
-    /// `fmi2EnterContinuousTimeMode`.
-    EnterContinuousTimeMode,
-    /// `fmi2SetTime`.
-    SetTime,
-    /// `fmi2SetContinuousStates` and `fmi2CompletedIntegratorStep`.
-    Integrate,
-    /// `fmi2GetContinuousStates` and its like.
-    GetContinuousStates,
 }
 
-/// The interface that an instance is used by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Interface {
-    /// It is stepped.
-    CoSimulation,
-    /// Its importer integrates its states.
-    ModelExchange,
-}
-
-/// The modes in which each call is legal in FMI 2.0 and in FMI 3.0, in the order of [`Call`] (FMI 2.0.4, sections 3.2.3 and
-/// 4.2.4, figures 6 and 11; FMI 3.0.2, sections 2.3.2 to 2.3.8, 3.2.1 and 4.2.1). They are wider than the standards where importers are:
-/// values may be read in every mode. Calls that are not here are legal in every mode.
-pub const LEGAL: [(Call, Mode, Mode); 14] = {
-    const EXCHANGED: Mode = Mode::EVENT.or(Mode::CONTINUOUS);
-    const SETTABLE: Mode = Mode::INSTANTIATED.or(Mode::INITIALIZATION).or(Mode::STEP).or(EXCHANGED);
-    const KNOWN: Mode = Mode::INITIALIZATION.or(Mode::STEP).or(Mode::TERMINATED).or(EXCHANGED);
-    const ENDED: Mode = Mode::STEP.or(EXCHANGED);
-    const STATES: Mode = Mode::INITIALIZATION.or(EXCHANGED).or(Mode::TERMINATED);
+/// The modes in which each call is legal, in the order of [`Call`] (FMI 2.0.4, section 4.2.4, figure 11; FMI 3.0.2, sections
+/// 2.3.2 to 2.3.8 and 4.2.1). They are wider than the standards where importers are: values may be read in every mode. Calls
+/// that are not here are legal in every mode.
+pub const LEGAL: [(Call, Mode); 8] = {
+    const SETTABLE: Mode = Mode::INSTANTIATED.or(Mode::INITIALIZATION).or(Mode::STEP);
+    const KNOWN: Mode = Mode::INITIALIZATION.or(Mode::STEP).or(Mode::TERMINATED);
     [
         // FMI 3.0 has no such function, but in process there is one for both.
-        (Call::SetupExperiment, Mode::INSTANTIATED, Mode::INSTANTIATED),
-        (Call::EnterInitializationMode, Mode::INSTANTIATED, Mode::INSTANTIATED),
-        (Call::ExitInitializationMode, Mode::INITIALIZATION, Mode::INITIALIZATION),
-        (Call::Terminate, ENDED, ENDED),
-        (Call::Get, Mode::ANY, Mode::ANY),
-        (Call::Set, SETTABLE, SETTABLE),
-        (Call::DoStep, Mode::STEP, Mode::STEP),
-        (Call::GetDirectionalDerivative, KNOWN, KNOWN),
-        // FMI 2.0 lets an importer go from event to event, and tell the time of one in it.
-        (Call::EnterEventMode, EXCHANGED, Mode::CONTINUOUS),
-        (Call::UpdateDiscreteStates, Mode::EVENT, Mode::EVENT),
-        (Call::EnterContinuousTimeMode, Mode::EVENT, Mode::EVENT),
-        (Call::SetTime, EXCHANGED, Mode::CONTINUOUS),
-        (Call::Integrate, Mode::CONTINUOUS, Mode::CONTINUOUS),
-        (Call::GetContinuousStates, STATES, STATES),
+        (Call::SetupExperiment, Mode::INSTANTIATED),
+        (Call::EnterInitializationMode, Mode::INSTANTIATED),
+        (Call::ExitInitializationMode, Mode::INITIALIZATION),
+        (Call::Terminate, Mode::STEP),
+        (Call::Get, Mode::ANY),
+        (Call::Set, SETTABLE),
+        (Call::DoStep, Mode::STEP),
+        (Call::GetDirectionalDerivative, KNOWN),
     ]
 };
 
 impl Call {
-    /// The modes in which it is legal in a version of FMI, by [`LEGAL`].
+    /// The modes in which it is legal, by [`LEGAL`].
     #[inline]
-    pub fn modes(self, fmi: FmiVersion) -> Mode {
-        let (_, two, three) = LEGAL[self as usize];
-        match fmi {
-            FmiVersion::Two => two,
-            FmiVersion::Three => three,
-        }
+    pub fn modes(self) -> Mode {
+        let (_, modes) = LEGAL[self as usize];
+        modes
     }
 }
 
@@ -243,7 +192,6 @@ pub struct Instance {
     kinds: Vec<(BaseType, Causality, Variability)>,
     /// The same for FMI 3.0, with the lengths of arrays; empty for FMI 2.0.
     accesses: Vec<Access>,
-    interface: Interface,
     block: Box<dyn Block>,
     /// The state of a new block, which remembers nothing yet.
     start: BlockState,
@@ -292,13 +240,12 @@ impl Instance {
         block.save(&mut start);
         let kinds =
             product.variables.iter().map(|v| (v.kind.base_type(), v.causality, v.variability)).collect();
-        let (accesses, rates) = (product.accesses(), product.layout.rates);
+        let accesses = product.accesses();
         let mut instance = Self {
             fmi: product.configuration.experiment().fmi,
             product,
             kinds,
             accesses,
-            interface: Interface::CoSimulation,
             block,
             start,
             mode: Mode::INSTANTIATED,
@@ -311,35 +258,10 @@ impl Instance {
             configured: false,
             unbroken: Unbroken::at(0.0),
             mistimed: Mistimed::Never,
-            derivative: std::array::from_fn(|_| vec![0.0; len + 1 + rates]),
+            derivative: std::array::from_fn(|_| vec![0.0; len]),
         };
         instance.start_values();
         Ok(instance)
-    }
-
-    /// The same for model exchange: the importer integrates the states.
-    ///
-    /// # Errors
-    ///
-    /// As of [`Self::new`]; an FMU that has to be stepped.
-    pub fn for_model_exchange(configuration: Configuration, guid: &str) -> Result<Self, Failure> {
-        let instance = Self::new(configuration, guid)?;
-        if instance.product.layout.rates == 0 {
-            let why = match &instance.product.configuration {
-                Configuration::Plant(plant) if plant.disturbance.is_none() => {
-                    "since it was built without; build it with `--model-exchange` or `experiment.model_exchange = true`"
-                }
-                Configuration::Plant(_) => "since a plant with a disturbance has to be stepped",
-                _ => "which plants alone have",
-            };
-            return Err(format!("the FMU has no model exchange, {why}"));
-        }
-        Ok(Self { interface: Interface::ModelExchange, ..instance })
-    }
-
-    /// The interface that it is used by.
-    pub fn interface(&self) -> Interface {
-        self.interface
     }
 
     /// The present mode.
@@ -362,17 +284,9 @@ impl Instance {
         self.fmi
     }
 
-    /// The modes that its interface does not have.
-    fn foreign(&self) -> Mode {
-        match self.interface {
-            Interface::CoSimulation => Mode::EVENT.or(Mode::CONTINUOUS),
-            Interface::ModelExchange => Mode::STEP,
-        }
-    }
-
     /// Whether it is past its initialization, so that fixed parameters stay as they are.
     fn is_running(&self) -> bool {
-        self.mode.is_in(Mode::STEP.or(Mode::EVENT).or(Mode::CONTINUOUS))
+        self.mode == Mode::STEP
     }
 
     /// Whether `call` is legal now.
@@ -382,7 +296,7 @@ impl Instance {
     /// A call that [`LEGAL`] excludes in this mode.
     #[inline]
     pub fn check(&self, call: Call) -> Result<(), Failure> {
-        let modes = call.modes(self.fmi);
+        let modes = call.modes();
         if self.mode.is_in(modes) { Ok(()) } else { Err(self.misplaced(modes)) }
     }
 
@@ -391,14 +305,10 @@ impl Instance {
     fn misplaced(&self, modes: Mode) -> Failure {
         let allowed: Vec<_> = Mode::EACH
             .into_iter()
-            .filter(|m| m.is_in(modes) && !m.is_in(self.foreign()))
+            .filter(|m| m.is_in(modes))
             .map(|mode| format!("{:?}", mode.name()))
             .collect();
-        let only = match allowed[..] {
-            [] => "and in no other of this interface".to_owned(),
-            _ => format!("only in {}", allowed.join(", ")),
-        };
-        format!("not allowed in the mode {:?}, {only}", self.mode.name())
+        format!("not allowed in the mode {:?}, only in {}", self.mode.name(), allowed.join(", "))
     }
 
     /// Takes the start time; tolerance and stop time are not needed.
@@ -447,7 +357,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Takes the parameters over and goes to step mode; in model exchange to event mode.
+    /// Takes the parameters over and goes to step mode.
     ///
     /// # Errors
     ///
@@ -455,10 +365,7 @@ impl Instance {
     pub fn exit_initialization_mode(&mut self) -> Result<(), Failure> {
         self.check(Call::ExitInitializationMode)?;
         self.configure().map_err(|e| e.to_string())?;
-        self.mode = match self.interface {
-            Interface::CoSimulation => Mode::STEP,
-            Interface::ModelExchange => Mode::EVENT,
-        };
+        self.mode = Mode::STEP;
         (self.unbroken, self.mistimed) = (Unbroken::at(self.time), Mistimed::Never);
         self.block.output(self.time, &mut self.values);
         self.fresh = true;
@@ -519,7 +426,6 @@ impl Instance {
             fmi: _,
             kinds: _,
             accesses: _,
-            interface: _,
             block,
             start: _,
             mode,
@@ -553,12 +459,6 @@ impl Instance {
             return Err(format!(
                 "the state belongs to the FMU with the GUID {guid:?}, must be {:?}",
                 self.product.guid
-            ));
-        }
-        if mode.is_in(self.foreign()) {
-            return Err(format!(
-                "the state is one in the mode {:?}, which the interface of this instance does not have",
-                mode.name()
             ));
         }
         let parameters = self.product.layout.parameters..self.product.layout.end;
@@ -702,26 +602,7 @@ impl Instance {
     ///
     /// A value reference that is not one of a real.
     pub fn get_real(&mut self, references: &[u32], out: &mut [f64]) -> Result<(), Failure> {
-        self.get(BaseType::Real, references, out, |values| &values.reals)?;
-        if self.product.layout.rates == 0 {
-            return Ok(());
-        }
-        let first = self.product.first_rate();
-        if references.iter().any(|&reference| reference as usize >= first) {
-            let rates = self.rates();
-            for (&reference, o) in references.iter().zip(out) {
-                if let Some(i) = (reference as usize).checked_sub(first) {
-                    *o = rates[i].value;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// The rates of the states now.
-    fn rates(&mut self) -> &[Tangent<f64>] {
-        self.derivative[0].fill(0.0);
-        self.block.rates(&self.values, &self.derivative[0])
+        self.get(BaseType::Real, references, out, |values| &values.reals)
     }
 
     /// Reads integers and enumerations.
@@ -775,22 +656,19 @@ impl Instance {
         Ok(())
     }
 
-    /// Checks that the real number `index` may have the `value`: a parameter within its range, a state any finite one, and
-    /// an input, which come first, any.
+    /// Checks that the real number `index` may have the `value`: a parameter within its range, and an input, which comes
+    /// before the outputs, any.
     #[inline]
     fn check_range(&self, index: usize, value: f64) -> Result<(), Failure> {
-        if index < self.product.layout.outputs { Ok(()) } else { self.check_range_of_own(index, value) }
+        match index.checked_sub(self.product.layout.parameters) {
+            None => Ok(()),
+            Some(i) => self.check_range_of_parameter(i, value),
+        }
     }
 
-    fn check_range_of_own(&self, index: usize, value: f64) -> Result<(), Failure> {
-        match index.checked_sub(self.product.layout.parameters) {
-            None if value.is_finite() => Ok(()),
-            None => Err(format!("{} is {value}, must be finite", self.product.variables[index].name)),
-            Some(i) => {
-                let name = &self.product.variables[index].name;
-                self.product.ranges[i].check(name, value).map_err(|e| e.to_string())
-            }
-        }
+    fn check_range_of_parameter(&self, i: usize, value: f64) -> Result<(), Failure> {
+        let name = &self.product.variables[self.product.layout.parameters + i].name;
+        self.product.ranges[i].check(name, value).map_err(|e| e.to_string())
     }
 
     /// Notes that reals were set.
@@ -858,7 +736,7 @@ impl Instance {
     #[inline(never)]
     fn refresh_stale(&mut self) {
         let lazy = match self.mode {
-            Mode::INITIALIZATION | Mode::EVENT | Mode::CONTINUOUS => true,
+            Mode::INITIALIZATION => true,
             Mode::STEP => self.block.direct_feedthrough(),
             _ => false,
         };

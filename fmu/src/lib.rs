@@ -13,7 +13,7 @@
 //! | [`block`] | the computation: a filter, plant or controller between value arrays |
 //! | [`instance`] | modes, legality of calls, time, lazy outputs: the FMI state machine in safe Rust |
 //! | [`state`] | a snapshot of an instance as bytes: layout, version, checksum |
-//! | `abi` | the exported functions, 44 of FMI 2.0 and 75 of 3.0: guard, convert, delegate; plug-ins. The only unsafe code |
+//! | `abi` | the exported functions, 34 of FMI 2.0 and 75 of 3.0: guard, convert, delegate; plug-ins. The only unsafe code |
 //!
 //! [`fmi2`] and [`fmi3`] have the C types of each version and the table of its functions, for whoever calls such a library.
 #![deny(unsafe_code)]

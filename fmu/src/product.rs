@@ -14,14 +14,14 @@ pub use outputs::{BARRIER_OUTPUTS, BarrierOutput, Reading};
 use punctual_core::filter::{Phase, Standing, Status};
 use punctual_modeldescription::{
     Causality, CoSimulation, DefaultExperiment, EnumerationItem, Integer, LogCategory, ModelDescription,
-    ModelExchange, NamingConvention, Plain, Real, SimpleType, Unit, Variability, Variable, VariableKind,
+    NamingConvention, Plain, Real, SimpleType, Unit, Variability, Variable, VariableKind,
 };
 use uuid::Uuid;
 
 use crate::configuration::{
     BarrierInput, Configuration, ConfigurationError, Controller, ControllerConfiguration,
     FilterConfiguration, FmiVersion, Parameter, PlantConfiguration, PlantSection, Range, VariableSection,
-    base_unit, over_seconds, quantity,
+    base_unit, quantity,
 };
 
 /// Log categories: name and meaning.
@@ -63,10 +63,7 @@ pub struct Layout {
     pub outputs: usize,
     /// First parameter.
     pub parameters: usize,
-    /// Number of states that an importer may integrate itself: those of a plant with model exchange, else 0.
-    pub rates: usize,
-    /// One past the last parameter: the first code, where there are [codes](Product::enumerated); with FMI 2.0 the first of
-    /// the rates.
+    /// One past the last parameter: the first code, where there are [codes](Product::enumerated).
     pub end: usize,
 }
 
@@ -107,15 +104,6 @@ impl Product {
         arrays::accesses(&self.variables, &self.items)
     }
 
-    /// The index of the first rate of the states that an importer may integrate: in the table of FMI 2.0, and beyond the one
-    /// of FMI 3.0, after the time.
-    pub(crate) fn first_rate(&self) -> usize {
-        match self.configuration.experiment().fmi {
-            FmiVersion::Two => self.variables.len() - self.layout.rates,
-            FmiVersion::Three => self.variables.len() + 1,
-        }
-    }
-
     /// The outputs that are enumerations. Each has a twin that is an Integer, from [`Layout::end`] on in the same order:
     /// some importers drop enumerations. (They come last, so that every other variable kept its value reference.)
     pub fn enumerated(&self) -> impl Iterator<Item = usize> + '_ {
@@ -150,15 +138,6 @@ impl Product {
             license: env!("CARGO_PKG_LICENSE").to_owned(),
             generation_tool: concat!("Punctual ", env!("CARGO_PKG_VERSION")).to_owned(),
             variable_naming_convention: NamingConvention::Structured,
-            model_exchange: (self.layout.rates > 0).then(|| ModelExchange {
-                model_identifier: name.clone(),
-                completed_integrator_step_not_needed: true,
-                can_not_use_memory_management_functions: true,
-                can_get_and_set_state: true,
-                can_serialize_state: true,
-                provides_directional_derivative: true,
-                ..ModelExchange::default()
-            }),
             co_simulation: CoSimulation {
                 model_identifier: name,
                 can_handle_variable_step: true,
@@ -344,17 +323,6 @@ impl Table {
         }
     }
 
-    /// Adds the rate of the state with the index `state`.
-    fn rate(&mut self, state: usize, dependencies: Vec<u32>) {
-        let (name, own) = (&self.variables[state].name, self.variables[state].kind.unit().unwrap_or("1"));
-        let (name, description, unit) =
-            (format!("der({name})"), format!("rate of {name}"), over_seconds(own, 1));
-        // The standard counts variables from 1.
-        let derivative = Some(state as u32 + 1);
-        let kind = VariableKind::Real(Real { derivative, ..real_of(None, &unit) });
-        self.add(name, &description, Causality::Local, kind).dependencies = Some(dependencies);
-    }
-
     /// Adds the parameters of `configuration`, which come after the outputs, then the codes, and completes `layout` with
     /// their position.
     fn finish<C: Clone>(
@@ -375,11 +343,8 @@ impl Table {
 }
 
 fn real(start: Option<f64>, unit: &str) -> VariableKind {
-    VariableKind::Real(real_of(start, unit))
-}
-
-fn real_of(start: Option<f64>, unit: &str) -> Real {
-    Real { start, quantity: quantity(unit), unit: Some(unit.to_owned()), ..Real::default() }
+    let (quantity, unit) = (quantity(unit), Some(unit.to_owned()));
+    VariableKind::Real(Real { start, quantity, unit, ..Real::default() })
 }
 
 fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
@@ -461,34 +426,24 @@ fn plant_variables(c: &PlantConfiguration) -> (Table, Layout) {
     let outputs = table.variables.len();
     let told = c.output_signals();
     let parameters = outputs + states.len() + told.len();
-    let rates = if c.can_be_integrated() { states.len() } else { 0 };
-    // Who integrates the states knows them.
-    let known =
-        |first: usize, count: usize| (first as u32..(first + count.min(rates)) as u32).collect::<Vec<_>>();
     for (i, state) in states.iter().enumerate() {
         let variable = table.signal("x", state, "", Causality::Output);
-        variable.dependencies = Some(known(outputs + i, 1));
+        variable.dependencies = Some(Vec::new());
         // `x0.*` are the first parameters, in the order of the states.
         variable.initial_dependencies = Some(vec![(parameters + i) as u32]);
     }
     let rows = c.parameters();
     for output in &told {
         let variable = table.signal("y", output, "", Causality::Output);
-        variable.dependencies = Some(known(outputs, states.len()));
+        variable.dependencies = Some(Vec::new());
         if c.experiment.fmi == FmiVersion::Three {
             // At the start it may depend on any state and constant. With FMI 2.0 that is what is said by nothing.
             let all = parameters..parameters + rows.len();
             variable.initial_dependencies = Some(all.map(|i| i as u32).collect());
         }
     }
-    let layout = Layout { states: states.len(), inputs: inputs.len(), outputs, rates, ..Layout::default() };
-    let (mut table, layout) = table.finish(c, &rows, layout);
-    if c.experiment.fmi == FmiVersion::Two {
-        for i in outputs..outputs + rates {
-            table.rate(i, (0..(outputs + rates) as u32).collect());
-        }
-    }
-    (table, layout)
+    let layout = Layout { states: states.len(), inputs: inputs.len(), outputs, ..Layout::default() };
+    table.finish(c, &rows, layout)
 }
 
 fn controller_variables(c: &ControllerConfiguration) -> (Table, Layout) {

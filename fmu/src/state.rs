@@ -198,11 +198,6 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
     // The fields of the instance, and the values in the order of the table.
     let mut input = Reader { rest: &content[HEADER..] };
     let mode: Mode = input.field("mode")?;
-    if mode.is_in(Mode::EVENT.or(Mode::CONTINUOUS)) && product.layout.rates == 0 {
-        // These two come after all others.
-        let index = Mode::EACH.iter().position(|each| *each == mode).unwrap_or_default();
-        return Err(format!("mode: is {index}, must be < {}", Mode::EACH.len() - 2));
-    }
     let time = input.finite("time")?;
     let stop = if has_stop(product) { input.field("stop")? } else { f64::INFINITY };
     if stop.is_nan() {

@@ -123,11 +123,7 @@ pub(crate) fn source<E: Equations>(
 
 /// The plant, to simulate.
 pub(crate) fn simulated<E: Equations>(plant: &E) -> Box<dyn DynPlant> {
-    Box::new(Simulated {
-        work: RefCell::new(Flow::new(plant)),
-        moving: RefCell::new(Flow::new(plant)),
-        inputs: plant.inputs(),
-    })
+    Box::new(Simulated { work: RefCell::new(Flow::new(plant)), inputs: plant.inputs() })
 }
 
 /// The motion of a plant: registers, and the stages of the Runge-Kutta method.
@@ -212,8 +208,6 @@ impl<E: Equations, C: Scalar> Flow<E, C> {
 /// A plant to simulate.
 struct Simulated<E> {
     work: RefCell<Flow<E, f64>>,
-    /// For rates, which change along a direction.
-    moving: RefCell<Flow<E, Tangent<f64>>>,
     inputs: usize,
 }
 
@@ -229,24 +223,6 @@ impl<E: Equations> DynPlant for Simulated<E> {
     fn rk4_step(&self, x: &mut [f64], u: &[f64], dt: f64) -> Result<(), punctual_core::Error> {
         punctual_core::dynamics::check_lengths((x, self.state_dim()), (u, self.inputs))?;
         moved(&mut self.work.borrow_mut(), x, u, dt, 1);
-        Ok(())
-    }
-
-    fn rates(
-        &self,
-        x: &[Tangent<f64>],
-        u: &[Tangent<f64>],
-        rates: &mut [Tangent<f64>],
-    ) -> Result<(), punctual_core::Error> {
-        punctual_core::dynamics::check_lengths((x, self.state_dim()), (u, self.inputs))?;
-        punctual_core::dynamics::check_lengths((rates, self.state_dim()), (u, self.inputs))?;
-        let flow = &mut *self.moving.borrow_mut();
-        flow.set_state(x.iter().copied());
-        flow.hold(u.iter().copied());
-        flow.equations.advance(&mut flow.series, 0);
-        for (i, rate) in rates.iter_mut().enumerate() {
-            *rate = flow.series.get(flow.equations.derivative(i), 0);
-        }
         Ok(())
     }
 }

@@ -5,7 +5,6 @@ use punctual_core::elementary;
 
 use punctual_core::dynamics::{ControlAffine, DynPlant, IntegratedInput, Region, chain, check_lengths, rk4};
 use punctual_core::error::{Error, positive};
-use punctual_core::jet::Tangent;
 use punctual_core::scalar::Scalar;
 
 /// One component of a state or input: its name, unit and meaning.
@@ -417,18 +416,6 @@ impl DynPlant for SteeredBicycle {
             SVector::from([x_p, y_p, theta, u[0]])
         };
         x.copy_from_slice(rk4(derivative, &SVector::from_column_slice(x), dt).as_slice());
-        Ok(())
-    }
-
-    fn rates(&self, x: &[Tangent<f64>], u: &[Tangent<f64>], rates: &mut [Tangent<f64>]) -> Result<(), Error> {
-        check_lengths((x, self.state_dim()), (u, self.input_dim()))?;
-        check_lengths((rates, self.state_dim()), (u, self.input_dim()))?;
-        let beta = match self.steering {
-            Steering::Angle => self.bicycle.slip_angle(u[1]),
-            Steering::SlipAngle => u[1],
-        };
-        let [x_p, y_p, theta] = self.bicycle.rates(x[2], x[3], beta);
-        rates.copy_from_slice(&[x_p, y_p, theta, u[0]]);
         Ok(())
     }
 }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use punctual_fmu::configuration::{Configuration, ConfigurationError, FmiVersion};
+use punctual_fmu::configuration::{Configuration, FmiVersion};
 use punctual_modeldescription::SspVersion;
 
 use crate::error::Error;
@@ -31,13 +31,6 @@ pub struct Arguments {
     /// With FMI 3.0, scalars instead of arrays, for tools that cannot take arrays
     #[arg(long)]
     scalars: bool,
-    /// Have a plant offer model exchange too; with FMI 3.0 each that can does so anyway
-    #[arg(long)]
-    model_exchange: bool,
-    /// Have the FMU carry inputs and the results that it gives here, by which a tool can check itself (FMI-LS-REF);
-    /// `punctual validate --references` does so
-    #[arg(long)]
-    references: bool,
 }
 
 /// The versions of SSP to pack for.
@@ -80,14 +73,9 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         let message = "is for an .ssp file, which is made from a system file";
         return Err(Error::configuration("--ssp", message));
     }
-    let mut configuration = super::read(file)?;
+    let configuration = super::read(file)?;
     for note in configuration.in_degrees() {
         output::note(&format!("note: {note}"));
-    }
-    if arguments.model_exchange {
-        let refused =
-            |e: ConfigurationError| Error::configuration("--model-exchange", e.message()).in_file(file);
-        configuration = configuration.with_model_exchange().map_err(refused)?;
     }
     let experiment = *configuration.experiment();
     let versions = match arguments.fmi {
@@ -105,7 +93,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         let configuration = configuration.clone().for_fmi(fmi, experiment.arrays && !arguments.scalars);
         let beside = several && fmi == FmiVersion::Three;
         let output = if beside { beside_it(&arguments.output) } else { arguments.output.clone() };
-        build(configuration, &arguments.libraries, &output, arguments.references)?;
+        build(configuration, &arguments.libraries, &output)?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -118,13 +106,8 @@ fn beside_it(file: &Path) -> PathBuf {
     file.with_file_name(name)
 }
 
-fn build(
-    configuration: Configuration,
-    libraries: &[PathBuf],
-    file: &Path,
-    references: bool,
-) -> Result<(), Error> {
-    let fmu = package::build(configuration, libraries, file, references)?;
+fn build(configuration: Configuration, libraries: &[PathBuf], file: &Path) -> Result<(), Error> {
+    let fmu = package::build(configuration, libraries, file)?;
     let description = fmu.description();
     let platform = description.version().platform();
     if !fmu.platforms().iter().any(|found| found == platform) {
@@ -164,15 +147,7 @@ fn pack(arguments: &Arguments, file: &Path) -> Result<ExitCode, Error> {
         let message = "is for one FMU; an .ssp file takes the FMUs that the system names as they are";
         return Err(Error::configuration("--library", message));
     }
-    if arguments.references {
-        let message = "is for one FMU; an .ssp file takes the FMUs that the system names as they are";
-        return Err(Error::configuration("--references", message));
-    }
-    let given = [
-        (arguments.scalars, "--scalars"),
-        (arguments.model_exchange, "--model-exchange"),
-        (arguments.fmi.is_some(), "--fmi"),
-    ];
+    let given = [(arguments.scalars, "--scalars"), (arguments.fmi.is_some(), "--fmi")];
     if let Some((_, option)) = given.into_iter().find(|(given, _)| *given) {
         let message = "is for one FMU; an .ssp file takes the FMUs that the system names as they are";
         return Err(Error::configuration(option, message));

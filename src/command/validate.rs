@@ -25,12 +25,6 @@ pub struct Arguments {
     /// Look at the files only; nothing of the FMU is run
     #[arg(long)]
     no_trial: bool,
-    /// Also run the FMU on the inputs that it carries, and compare with the results that it carries (FMI-LS-REF)
-    #[arg(long, conflicts_with = "no_trial")]
-    references: bool,
-    /// How far from such a result an output may be, as a share of the largest number of its column (0 to 1)
-    #[arg(long, value_name = "SHARE", default_value = "0", value_parser = share, requires = "references")]
-    tolerance: f64,
     /// List the rules
     #[arg(long, conflicts_with_all = ["file", "no_trial"])]
     rules: bool,
@@ -46,14 +40,6 @@ pub struct TrialArguments {
     /// The time that it may take, in seconds
     #[arg(long, value_parser = seconds)]
     time_limit: Duration,
-    /// Compare with the references that the FMU carries, within this share
-    #[arg(long)]
-    references: Option<f64>,
-}
-
-fn share(text: &str) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|value| (0.0..=1.0).contains(value));
-    value.ok_or_else(|| "must be a number, 0 to 1".to_owned())
 }
 
 pub(super) fn seconds(text: &str) -> Result<Duration, String> {
@@ -92,8 +78,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         return Ok(ExitCode::SUCCESS);
     };
     let limit = (!arguments.no_trial).then_some(arguments.time_limit);
-    let references = arguments.references.then_some(arguments.tolerance);
-    let found = validate::validate(file, limit, references)?;
+    let found = validate::validate(file, limit)?;
     let report = Report {
         file: file.display().to_string(),
         errors: found.count(Severity::Error),
@@ -146,6 +131,6 @@ fn rules(json: bool) {
 ///
 /// The folder cannot be written to.
 pub fn execute_trial(arguments: &TrialArguments) -> Result<ExitCode, Error> {
-    trial::perform(&arguments.file, &arguments.folder, arguments.time_limit, arguments.references)?;
+    trial::perform(&arguments.file, &arguments.folder, arguments.time_limit)?;
     Ok(ExitCode::SUCCESS)
 }

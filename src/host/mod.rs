@@ -151,13 +151,9 @@ impl Fmu {
 
     /// The text of a file in its `resources/`; `None` where there is no such text.
     pub fn resource(&self, name: &str) -> Option<String> {
-        self.text(&format!("resources/{name}"))
-    }
-
-    /// The text of an entry; `None` where there is no such text.
-    pub fn text(&self, entry: &str) -> Option<String> {
-        let is_there = self.archive.entries().iter().any(|other| other == entry);
-        is_there.then(|| std::fs::read_to_string(self.archive.path(entry)).ok())?
+        let entry = format!("resources/{name}");
+        let is_there = self.archive.entries().contains(&entry);
+        is_there.then(|| std::fs::read_to_string(self.archive.path(&entry)).ok())?
     }
 }
 

@@ -224,7 +224,7 @@ fn write(product: &written::Archive, file: &Path, limit: Option<Duration>) -> Re
     let place = tempfile::Builder::new().prefix(".punctual-").tempdir_in(folder).map_err(failed)?;
     let draft = place.path().join("product.fmu");
     std::fs::write(&draft, bytes).map_err(failed)?;
-    let mut report = validate::validate(&draft, limit, None)?;
+    let mut report = validate::validate(&draft, limit)?;
     for finding in &mut report.findings {
         let (from, to) = (draft.display().to_string(), file.display().to_string());
         finding.message = finding.message.replace(&from, &to);

@@ -19,7 +19,6 @@ use punctual_modeldescription::{Archive, Timestamp};
 
 use crate::error::Error;
 use crate::host::{Fmu, PLATFORM};
-use crate::references::References;
 use crate::whole;
 use library::Library;
 
@@ -132,17 +131,12 @@ pub fn archive(product: &Product, libraries: Vec<Library>) -> Result<Archive, Er
 
 /// Writes the FMU of `configuration` with the [`libraries`](library::read) to `file`. Then it opens the file as an importer would: it
 /// reads the description, loads the library for this platform if there is one, makes an instance and initialises it. A product
-/// that does not work is removed again. `references` has it carry inputs and the results that it gave here.
+/// that does not work is removed again.
 ///
 /// # Errors
 ///
 /// A file that cannot be written, a plug-in with libraries for other platforms, or a product that does not work.
-pub fn build(
-    configuration: Configuration,
-    libraries: &[PathBuf],
-    file: &Path,
-    references: bool,
-) -> Result<Rc<Fmu>, Error> {
+pub fn build(configuration: Configuration, libraries: &[PathBuf], file: &Path) -> Result<Rc<Fmu>, Error> {
     let product = Product::new(configuration)?;
     let libraries = library::read(libraries)?;
     let other = libraries.iter().find(|library| library.platform != PLATFORM);
@@ -154,27 +148,9 @@ pub fn build(
         return Err(Error::configuration("--library", message));
     }
     let can_run = libraries.iter().any(|library| library.platform == PLATFORM);
-    if references && !can_run {
-        let message = format!("runs the FMU, and no --library is for this platform, {PLATFORM}");
-        return Err(Error::configuration("--references", message));
-    }
-    let write = |files: Vec<(String, String)>| {
-        let mut archive = archive(&product, libraries.clone())?;
-        for (place, text) in files {
-            archive.add(&place, text).map_err(|e| broken(&e))?;
-        }
-        whole::write(file, archive.to_bytes().map_err(|e| broken(&e))?)
-    };
-    write(Vec::new())?;
-    let tried = || {
-        let fmu = if can_run { tried(&product, file)? } else { Rc::new(Fmu::open(file)?) };
-        if !references {
-            return Ok(fmu);
-        }
-        write(References::make(&fmu)?.files())?;
-        Fmu::open(file).map(Rc::new)
-    };
-    tried().inspect_err(|_| {
+    whole::write(file, archive(&product, libraries)?.to_bytes().map_err(|e| broken(&e))?)?;
+    let opened = if can_run { tried(&product, file) } else { Fmu::open(file).map(Rc::new) };
+    opened.inspect_err(|_| {
         // If this fails too, the first error is the one to tell.
         let _ = std::fs::remove_file(file);
     })

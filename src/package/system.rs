@@ -68,7 +68,7 @@ fn fmu(path: &Path) -> Result<(Opened, Option<String>), Error> {
     let warning = configuration.warning().map(|warning| format!("{}: {warning}", path.display()));
     let folder = tempfile::tempdir().map_err(|e| Error::io("make a folder in", &std::env::temp_dir(), e))?;
     let file = folder.path().join("made.fmu");
-    Ok(((super::build(configuration, &[], &file, false)?, read(&file)?), warning))
+    Ok(((super::build(configuration, &[], &file)?, read(&file)?), warning))
 }
 
 /// The FMUs of a system, each file once.

@@ -130,11 +130,6 @@ const AFTER: &[Rule] = &[
         Warning,
         "derivatives agree with differences, and adjoint with directional ones (FMI 3.0)",
     ),
-    (
-        "trial.references",
-        Error,
-        "with --references: outputs are the results that the FMU carries (FMI-LS-REF)",
-    ),
     ("trial.instances", Warning, "there can be two instances, unless the description says otherwise"),
 ];
 

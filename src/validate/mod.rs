@@ -50,13 +50,13 @@ impl Report {
 }
 
 /// Examines the FMU at `path`. `limit` is the time of the trial; `None` leaves it out, and nothing of the FMU is
-/// run. `references` compares with the results that the FMU carries, within this share of the largest number.
+/// run.
 ///
 /// # Errors
 ///
 /// The file cannot be read, it is of another version of FMI, or the trial's process cannot be started. Any defect of
 /// the FMU is a finding.
-pub fn validate(path: &Path, limit: Option<Duration>, references: Option<f64>) -> Result<Report, Error> {
+pub fn validate(path: &Path, limit: Option<Duration>) -> Result<Report, Error> {
     let mut findings = Findings::default();
     let mut skipped = Vec::new();
     let archive = match Archive::open(path) {
@@ -102,7 +102,7 @@ pub fn validate(path: &Path, limit: Option<Duration>, references: Option<f64>) -
     match (limit, reason) {
         (None, _) => skipped.push("the trial: it was not wanted".to_owned()),
         (_, Some(reason)) => skipped.push(format!("the trial: {reason}")),
-        (Some(limit), None) => trial::run(path, limit, references, &mut findings)?,
+        (Some(limit), None) => trial::run(path, limit, &mut findings)?,
     }
     Ok(Report { findings: findings.finish(), skipped })
 }

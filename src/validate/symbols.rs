@@ -41,13 +41,27 @@ const PROCESSORS_OF_FMI3: [(&str, &[Architecture]); 7] = [
 /// Functions that a library must export, and what they are those of.
 type Wanted = (&'static [&'static str], &'static str);
 
+/// The functions that model exchange adds in FMI 2.0.
+const EXCHANGE: &[&str] = &[
+    "fmi2EnterEventMode",
+    "fmi2NewDiscreteStates",
+    "fmi2EnterContinuousTimeMode",
+    "fmi2CompletedIntegratorStep",
+    "fmi2SetTime",
+    "fmi2SetContinuousStates",
+    "fmi2GetDerivatives",
+    "fmi2GetEventIndicators",
+    "fmi2GetContinuousStates",
+    "fmi2GetNominalsOfContinuousStates",
+];
+
 /// The functions that the library of a model called `identifier` must export.
 fn functions(model: &Model, identifier: &str) -> Vec<Wanted> {
     match model {
         Model::Fmi2(of) => {
             let exchange = of.description.model_exchange.as_ref();
             let exchange = exchange.is_some_and(|exchange| exchange.model_identifier == identifier);
-            let exchange = exchange.then_some((fmi2::EXCHANGE_FUNCTIONS, "FMI 2.0 model exchange"));
+            let exchange = exchange.then_some((EXCHANGE, "FMI 2.0 model exchange"));
             let stepped = of.model_identifier() == Some(identifier);
             let stepped = stepped.then_some((fmi2::FUNCTIONS, "FMI 2.0 co-simulation"));
             stepped.into_iter().chain(exchange).collect()

@@ -10,12 +10,11 @@ use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 use super::finding::{Finding, Findings, Place, severity};
-use crate::error::{Error, FmuProblem};
+use crate::error::Error;
 use crate::host::{
     Archive, Causality, DataType, Description, Fmu, Slave, Status, Variability, Variable, Version, journal,
 };
 use crate::isolation::{self, Break, Child, End, Voice};
-use crate::references::{Difference, References};
 
 /// The name of the trial's instance.
 const INSTANCE: &str = "trial";
@@ -72,18 +71,17 @@ pub(super) fn reason_to_skip(
     needs_tool.then(|| "the FMU needs a tool that drives it (needsExecutionTool)".to_owned())
 }
 
-/// Tries the FMU in a child process, at most for `limit`, and compares with its `references` within this share.
-pub(super) fn run(
-    path: &Path,
-    limit: Duration,
-    references: Option<f64>,
-    findings: &mut Findings,
-) -> Result<(), Error> {
+/// Tries the FMU in a child process, at most for `limit`.
+pub(super) fn run(path: &Path, limit: Duration, findings: &mut Findings) -> Result<(), Error> {
     let child = Child::new()?;
-    let mut words: Vec<OsString> =
-        vec!["trial".into(), "--time-limit".into(), limit.as_secs_f64().to_string().into()];
-    words.extend(references.into_iter().flat_map(|share| ["--references".into(), share.to_string().into()]));
-    words.extend(["--".into(), path.into(), child.folder().into()]);
+    let words: Vec<OsString> = vec![
+        "trial".into(),
+        "--time-limit".into(),
+        limit.as_secs_f64().to_string().into(),
+        "--".into(),
+        path.into(),
+        child.folder().into(),
+    ];
     let end = child.run(words, Voice::Silent, Some(limit))?;
     // Findings that the child wrote before its end. A line cut off by a crash is no finding.
     let told = std::fs::read_to_string(findings_file(child.folder())).unwrap_or_default();
@@ -130,24 +128,18 @@ fn findings_file(folder: &Path) -> PathBuf {
     folder.join("findings.jsonl")
 }
 
-/// Tries the FMU at `path` in this process, which has so much time, and compares with its `references` within this share. Its findings go into files in `folder`, at once.
+/// Tries the FMU at `path` in this process, which has so much time. Its findings go into files in `folder`, at once.
 ///
 /// # Errors
 ///
 /// The folder cannot be written to.
-pub fn perform(path: &Path, folder: &Path, limit: Duration, references: Option<f64>) -> Result<(), Error> {
+pub fn perform(path: &Path, folder: &Path, limit: Duration) -> Result<(), Error> {
     isolation::settle(folder)?;
     let file = findings_file(folder);
     let file = File::create(&file).map_err(|e| Error::io("write", &file, e))?;
     let mut trial = Trial { file, limit, told: HashSet::new() };
     match Fmu::open(path).map(Rc::new) {
-        Ok(fmu) => {
-            trial.note(|trial| trial.all(&fmu));
-            // Whatever became of the calls above, what was asked for is compared.
-            if let Some(tolerance) = references {
-                trial.note(|trial| trial.references(&fmu, tolerance));
-            }
-        }
+        Ok(fmu) => trial.note(|trial| trial.all(&fmu)),
         Err(error) => trial.note(|_| Err(error)),
     }
     journal::finish();
@@ -180,7 +172,6 @@ impl Trial {
         let rule = match error.as_call() {
             _ if is_discarded(&error) => "trial.discard",
             Some(_) => "trial.call",
-            None if matches!(error.as_fmu_problem(), Some(FmuProblem::References(_))) => "trial.references",
             None => "trial.load",
         };
         self.tell(rule, None, &error.to_string());
@@ -236,33 +227,6 @@ impl Trial {
         }
         if !description.only_once {
             self.two_instances(fmu, slave, plan);
-        }
-        Ok(())
-    }
-
-    /// Compares with the results that the FMU carries.
-    fn references(&mut self, fmu: &Rc<Fmu>, tolerance: f64) -> Result<(), Error> {
-        let Some(references) = References::of(fmu)? else {
-            self.tell(
-                "trial.references",
-                None,
-                "the FMU carries no references, so there is nothing to compare with",
-            );
-            return Ok(());
-        };
-        let differences = match references.compare(fmu, tolerance) {
-            Err(error) if error.as_call().is_some() => {
-                self.tell("trial.references", None, &format!("cannot be compared: {error}"));
-                return Ok(());
-            }
-            other => other?,
-        };
-        for Difference { name, time, value, reference } in differences {
-            let text = format!(
-                "is {value} at t = {} s, where its reference is {reference}; allowed is a share of {tolerance}",
-                crate::error::brief_time(time)
-            );
-            self.tell("trial.references", Some(&name), &text);
         }
         Ok(())
     }

@@ -64,21 +64,6 @@ macro_rules! api {
 
 punctual_fmu::fmi2_functions!(api);
 
-/// The functions that model exchange adds.
-pub(crate) mod exchange {
-    use std::path::Path;
-    use std::sync::LazyLock;
-
-    use punctual_fmu::fmi2::{Boolean, EventInfo};
-
-    use super::{Component, Status};
-
-    punctual_fmu::fmi2_exchange_functions!(api);
-
-    /// The library, loaded once for all tests that do not unload it.
-    pub(crate) static API: LazyLock<Api> = LazyLock::new(|| Api::load(&super::library_path()));
-}
-
 /// The functions of FMI 3.0.
 pub(crate) mod three {
     use std::ffi::c_int;

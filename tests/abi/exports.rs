@@ -5,10 +5,10 @@ use std::ffi::CStr;
 use std::process::Command;
 use std::ptr::{null, null_mut};
 
-use punctual_fmu::fmi2::{EXCHANGE_FUNCTIONS, FUNCTIONS};
+use punctual_fmu::fmi2::FUNCTIONS;
 use punctual_fmu::fmi3;
 
-use crate::api::{API, ERROR, exchange, library_path, three};
+use crate::api::{API, ERROR, library_path, three};
 
 #[test]
 fn all_34_functions_resolve() {
@@ -16,13 +16,6 @@ fn all_34_functions_resolve() {
     assert_eq!(unique.len(), 34, "{FUNCTIONS:?}");
     // Loading resolves each symbol.
     let _ = &*API;
-}
-
-#[test]
-fn the_10_functions_of_model_exchange_resolve() {
-    let unique: BTreeSet<_> = EXCHANGE_FUNCTIONS.iter().collect();
-    assert_eq!(unique.len(), 10, "{EXCHANGE_FUNCTIONS:?}");
-    let _ = &*exchange::API;
 }
 
 #[test]
@@ -46,8 +39,7 @@ fn told(tool: &str, arguments: &[&str]) -> String {
 fn nothing_else_is_exported() {
     let text = told("nm", &["-D", "--defined-only"]);
     let found: BTreeSet<_> = text.lines().filter_map(|line| line.split_whitespace().last()).collect();
-    let all = [FUNCTIONS, EXCHANGE_FUNCTIONS, fmi3::FUNCTIONS];
-    let wanted: BTreeSet<_> = all.into_iter().flatten().copied().collect();
+    let wanted: BTreeSet<_> = FUNCTIONS.iter().chain(fmi3::FUNCTIONS).copied().collect();
     assert_eq!(found, wanted);
 }
 
@@ -130,19 +122,6 @@ fn a_null_component_is_an_error_everywhere() {
     ];
     assert_eq!(statuses.len(), 34 - 4, "all but the two constants, fmi2Instantiate and fmi2FreeInstance");
     assert_eq!(statuses, [ERROR; 30]);
-    let exchanged = [
-        (exchange::API.enter_event_mode)(c),
-        (exchange::API.new_discrete_states)(c, null_mut()),
-        (exchange::API.enter_continuous_time_mode)(c),
-        (exchange::API.completed_integrator_step)(c, 1, int, int),
-        (exchange::API.set_time)(c, 0.0),
-        (exchange::API.set_continuous_states)(c, real, 1),
-        (exchange::API.get_derivatives)(c, real, 1),
-        (exchange::API.get_event_indicators)(c, real, 1),
-        (exchange::API.get_continuous_states)(c, real, 1),
-        (exchange::API.get_nominals_of_continuous_states)(c, real, 1),
-    ];
-    assert_eq!(exchanged, [ERROR; 10]);
     // SAFETY: a local variable that still lives.
     assert_eq!(unsafe { *real }, 1.5, "nothing was written");
     // SAFETY: as above.

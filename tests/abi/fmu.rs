@@ -77,12 +77,6 @@ impl Fmu {
         Self::of("extracted", configuration.for_fmi(FmiVersion::Three, arrays))
     }
 
-    /// The FMU of FMI 2.0 with model exchange.
-    pub(crate) fn exchanged(configuration: &str) -> Self {
-        let configuration = Configuration::parse(configuration).expect("a valid configuration");
-        Self::of("extracted", configuration.with_model_exchange().expect("a plant"))
-    }
-
     fn of(name: &str, configuration: Configuration) -> Self {
         let folder = TempDir::new().expect("a temporary folder");
         let resources = folder.path().join(name).join("resources");

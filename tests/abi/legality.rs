@@ -3,16 +3,11 @@
 use std::ffi::c_int;
 use std::ptr::{null, null_mut};
 
-use punctual_fmu::configuration::FmiVersion;
-use punctual_fmu::instance::{Call, Interface, LEGAL, Mode};
+use punctual_fmu::instance::{Call, LEGAL, Mode};
 
-use crate::api::exchange::API as EXCHANGED;
 use crate::api::{API, DISCARD, ERROR, OK};
-use crate::exchange::NO_EVENT;
 use crate::fmu::{FILTER, Fmu, PLANT};
 use crate::slave::Slave;
-
-const MODES: [Mode; 4] = [Mode::INSTANTIATED, Mode::INITIALIZATION, Mode::STEP, Mode::TERMINATED];
 
 /// A function, its call in the table (`None`: legal in every mode), and its answer where legal: OK, or as its
 /// capability flag or meaning says.
@@ -99,77 +94,15 @@ const FUNCTIONS: [Function; 30] = [
     ),
 ];
 
-/// Those that model exchange adds, for the unicycle.
-const EXCHANGE: [Function; 10] = [
-    ("fmi2EnterEventMode", Some(Call::EnterEventMode), |s| (EXCHANGED.enter_event_mode)(s.component), OK),
-    (
-        "fmi2NewDiscreteStates",
-        Some(Call::UpdateDiscreteStates),
-        |s| (EXCHANGED.new_discrete_states)(s.component, &mut NO_EVENT.clone()),
-        OK,
-    ),
-    (
-        "fmi2EnterContinuousTimeMode",
-        Some(Call::EnterContinuousTimeMode),
-        |s| (EXCHANGED.enter_continuous_time_mode)(s.component),
-        OK,
-    ),
-    (
-        "fmi2CompletedIntegratorStep",
-        Some(Call::Integrate),
-        |s| (EXCHANGED.completed_integrator_step)(s.component, 1, &mut 0, &mut 0),
-        OK,
-    ),
-    ("fmi2SetTime", Some(Call::SetTime), |s| (EXCHANGED.set_time)(s.component, 0.5), OK),
-    (
-        "fmi2SetContinuousStates",
-        Some(Call::Integrate),
-        |s| (EXCHANGED.set_continuous_states)(s.component, [1.0; 4].as_ptr(), 4),
-        OK,
-    ),
-    (
-        "fmi2GetDerivatives",
-        Some(Call::GetContinuousStates),
-        |s| (EXCHANGED.get_derivatives)(s.component, [0.0; 4].as_mut_ptr(), 4),
-        OK,
-    ),
-    (
-        "fmi2GetEventIndicators",
-        Some(Call::GetContinuousStates),
-        |s| (EXCHANGED.get_event_indicators)(s.component, null_mut(), 0),
-        OK,
-    ),
-    (
-        "fmi2GetContinuousStates",
-        Some(Call::GetContinuousStates),
-        |s| (EXCHANGED.get_continuous_states)(s.component, [0.0; 4].as_mut_ptr(), 4),
-        OK,
-    ),
-    (
-        "fmi2GetNominalsOfContinuousStates",
-        Some(Call::Get),
-        |s| (EXCHANGED.get_nominals_of_continuous_states)(s.component, [0.0; 4].as_mut_ptr(), 4),
-        OK,
-    ),
-];
-
 /// Brings a new instance into `mode`.
-fn into_mode(fmu: &Fmu, interface: Interface, mode: Mode) -> Slave<'_> {
-    let slave = match interface {
-        Interface::CoSimulation => Slave::new(fmu),
-        Interface::ModelExchange => Slave::exchanged(fmu),
-    };
+fn into_mode(fmu: &Fmu, mode: Mode) -> Slave<'_> {
+    let slave = Slave::new(fmu);
     let c = slave.component;
-    if mode == Mode::INSTANTIATED {
-        return slave;
+    if mode != Mode::INSTANTIATED {
+        slave.ok((API.enter_initialization_mode)(c));
     }
-    slave.ok((API.enter_initialization_mode)(c));
-    if mode == Mode::INITIALIZATION {
-        return slave;
-    }
-    slave.ok((API.exit_initialization_mode)(c));
-    if interface == Interface::ModelExchange && mode != Mode::EVENT {
-        slave.ok((EXCHANGED.enter_continuous_time_mode)(c));
+    if mode == Mode::STEP || mode == Mode::TERMINATED {
+        slave.ok((API.exit_initialization_mode)(c));
     }
     if mode == Mode::TERMINATED {
         slave.ok((API.terminate)(c));
@@ -177,8 +110,8 @@ fn into_mode(fmu: &Fmu, interface: Interface, mode: Mode) -> Slave<'_> {
     slave
 }
 
-/// Goes on from `mode` by the calls that only this mode allows, to a step, or to rates; returns all that was seen there.
-fn finish(slave: &Slave, interface: Interface, mode: Mode) -> Vec<String> {
+/// Goes on from `mode` by the calls that only this mode allows, to a step; returns all that was seen there.
+fn finish(slave: &Slave, mode: Mode) -> Vec<String> {
     let c = slave.component;
     if mode == Mode::TERMINATED {
         let mut terminated = 0;
@@ -190,19 +123,11 @@ fn finish(slave: &Slave, interface: Interface, mode: Mode) -> Vec<String> {
         slave.ok((API.setup_experiment)(c, 0, 0.0, 0.0, 0, 0.0));
         slave.ok((API.enter_initialization_mode)(c));
     }
-    if !mode.is_in(Mode::STEP) && !mode.is_in(Mode::EVENT) && !mode.is_in(Mode::CONTINUOUS) {
+    if mode != Mode::STEP {
         slave.ok((API.exit_initialization_mode)(c));
     }
     slave.set_inputs(&[0.5, 0.25]);
-    match interface {
-        Interface::CoSimulation => slave.step(0.0, 0.1),
-        Interface::ModelExchange => {
-            if mode != Mode::CONTINUOUS {
-                slave.ok((EXCHANGED.enter_continuous_time_mode)(c));
-            }
-            slave.ok((EXCHANGED.set_time)(c, 0.125));
-        }
-    }
+    slave.step(0.0, 0.1);
     slave.snapshot()
 }
 
@@ -216,54 +141,30 @@ fn the_table_is_in_the_order_of_the_calls() {
 #[test]
 fn every_function_in_every_mode() {
     for configuration in [FILTER, PLANT] {
-        judge(&Fmu::new(configuration), Interface::CoSimulation, &MODES);
-    }
-}
-
-#[test]
-fn every_function_in_every_mode_of_model_exchange() {
-    let fmu = Fmu::exchanged(PLANT);
-    let modes = [Mode::INSTANTIATED, Mode::INITIALIZATION, Mode::TERMINATED, Mode::EVENT, Mode::CONTINUOUS];
-    judge(&fmu, Interface::ModelExchange, &modes);
-    judge(&fmu, Interface::CoSimulation, &MODES);
-}
-
-/// Calls every function in each of `modes`, those that the interface has.
-fn judge(fmu: &Fmu, interface: Interface, own: &[Mode]) {
-    let fresh = finish(&into_mode(fmu, interface, Mode::INSTANTIATED), interface, Mode::INSTANTIATED);
-    // A co-simulation has no function of model exchange.
-    let stepped = interface == Interface::CoSimulation;
-    let exchange =
-        EXCHANGE.map(
-            |(name, call, function, answer)| {
-                if stepped { (name, None, function, ERROR) } else { (name, call, function, answer) }
-            },
-        );
-    for &mode in own {
-        for (name, call, function, answer) in FUNCTIONS.into_iter().chain(exchange) {
-            let modes = call.map_or(Mode::ANY, |call| call.modes(FmiVersion::Two));
-            let slave = into_mode(fmu, interface, mode);
-            let found = function(&slave);
-            let place = format!("{name} in {}: {:?}", mode.name(), slave.log.messages());
-            if mode.is_in(modes) {
-                assert_eq!(found, answer, "{place}");
-                if answer == ERROR {
-                    let message = slave.log.failure();
-                    assert!(message.starts_with(&format!("{name}: not supported: ")), "{message}");
+        let fmu = Fmu::new(configuration);
+        let fresh = finish(&Slave::new(&fmu), Mode::INSTANTIATED);
+        for mode in Mode::EACH {
+            for (name, call, function, answer) in FUNCTIONS {
+                let modes = call.map_or(Mode::ANY, Call::modes);
+                let slave = into_mode(&fmu, mode);
+                let found = function(&slave);
+                let place = format!("{name} in {}: {:?}", mode.name(), slave.log.messages());
+                if mode.is_in(modes) {
+                    assert_eq!(found, answer, "{place}");
+                    if answer == ERROR {
+                        let message = slave.log.failure();
+                        assert!(message.starts_with(&format!("{name}: not supported: ")), "{message}");
+                    }
+                    continue;
                 }
-                continue;
+                assert_eq!(found, ERROR, "{place}");
+                let message = slave.log.failure();
+                let allowed = Mode::EACH.iter().filter(|m| m.is_in(modes));
+                let allowed: Vec<_> = allowed.map(|m| format!("{:?}", m.name())).collect();
+                let (now, allowed) = (mode.name(), allowed.join(", "));
+                assert_eq!(message, format!("{name}: not allowed in the mode {now:?}, only in {allowed}"));
+                assert_eq!(finish(&slave, mode), fresh, "after the refused {name} in {now}");
             }
-            assert_eq!(found, ERROR, "{place}");
-            let message = slave.log.failure();
-            let allowed = Mode::EACH.iter().filter(|m| own.contains(m) && m.is_in(modes));
-            let allowed: Vec<_> = allowed.map(|m| format!("{:?}", m.name())).collect();
-            let only = match allowed[..] {
-                [] => "and in no other of this interface".to_owned(),
-                _ => format!("only in {}", allowed.join(", ")),
-            };
-            assert_eq!(message, format!("{name}: not allowed in the mode {:?}, {only}", mode.name()));
-            let found = finish(&slave, interface, mode);
-            assert_eq!(found, fresh, "after the refused {name} in {}", mode.name());
         }
     }
 }

@@ -20,7 +20,6 @@
 //! | `states` | snapshots: layout, lifetime, refusals |
 //! | `rollback` | that going back and on gives the same bits |
 //! | `mistimed` | times that a restore took back, told at the next step |
-//! | `exchange` | model exchange: bits, modes, refusals, derivatives |
 //! | `fmi3` | the functions of FMI 3.0, beside those of 2.0 |
 //! | `lifetime` | reset, several instances, threads, unloading |
 
@@ -29,7 +28,6 @@ mod arguments;
 mod arming;
 mod assurance;
 mod derivatives;
-mod exchange;
 mod exports;
 mod external;
 mod fmi3;

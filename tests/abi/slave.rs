@@ -4,7 +4,6 @@ use std::ffi::{CStr, CString, c_int, c_void};
 use std::sync::Mutex;
 
 use punctual_core::filter::SafetyFilter;
-use punctual_fmu::fmi2::{CO_SIMULATION, MODEL_EXCHANGE};
 use punctual_modeldescription::BaseType;
 
 use crate::api::{API, Api, Callbacks, Component, ERROR, OK, State, Text, callbacks};
@@ -92,21 +91,12 @@ impl<'a> Slave<'a> {
 
     /// An instance of a library of its own.
     pub(crate) fn from(api: &'a Api, fmu: &'a Fmu) -> Self {
-        Self::of(api, fmu, CO_SIMULATION)
-    }
-
-    /// An instance for model exchange.
-    pub(crate) fn exchanged(fmu: &'a Fmu) -> Self {
-        Self::of(&API, fmu, MODEL_EXCHANGE)
-    }
-
-    fn of(api: &'a Api, fmu: &'a Fmu, kind: c_int) -> Self {
         let log = Box::<Log>::default();
         let callbacks = log.callbacks();
         let (guid, location) = (CString::new(fmu.guid()).unwrap(), CString::new(fmu.location()).unwrap());
         let name = c"slave".as_ptr();
         let component =
-            (api.instantiate)(name, kind, guid.as_ptr(), location.as_ptr(), &raw const callbacks, 0, 0);
+            (api.instantiate)(name, 1, guid.as_ptr(), location.as_ptr(), &raw const callbacks, 0, 0);
         assert!(!component.is_null(), "{:?}", log.messages());
         Self { component, log, fmu, api }
     }

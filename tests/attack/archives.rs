@@ -114,7 +114,7 @@ fn archives_with_edits() {
             }
         }
         std::fs::write(&path, archive).expect("a writable folder");
-        let report = match validate(&path, None, None) {
+        let report = match validate(&path, None) {
             Ok(report) => report,
             Err(refusal) => {
                 // Another version is out of scope, and nothing is said of what else there is.

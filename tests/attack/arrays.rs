@@ -1,4 +1,4 @@
-//! The functions of FMI 3.0 in any order with any arguments, on instances of both interfaces.
+//! The functions of FMI 3.0 in any order with any arguments, on one instance.
 //!
 //! What `calls` asks of FMI 2.0 in depth is the same code here. So this looks at what every call must keep: a known
 //! status, one message for a failure and none for a success, the table of legal modes, nothing changed by a failure.
@@ -8,7 +8,6 @@ use std::ffi::{CStr, CString, c_int, c_void};
 use std::ptr::{null, null_mut};
 use std::sync::LazyLock;
 
-use punctual_fmu::configuration::FmiVersion;
 use punctual_fmu::fmi3::Status;
 use punctual_fmu::instance::{Call, Mode};
 
@@ -56,7 +55,6 @@ unsafe extern "C" fn log(environment: *mut c_void, status: Status, category: Tex
 struct Slave {
     fmu: &'static Fmu,
     instance: Instance,
-    exchange: bool,
     mode: Mode,
     log: Box<RefCell<Log>>,
     states: Vec<(State, Mode)>,
@@ -71,22 +69,18 @@ impl Drop for Slave {
 }
 
 impl Slave {
-    /// An instance of the kind that `bytes` say, all messages wanted.
+    /// An instance of the FMU that `bytes` say, all messages wanted.
     fn new(bytes: &mut Bytes) -> Self {
         let fmu = &FLEET[bytes.below(FLEET.len())];
-        let exchange = fmu.product.layout.rates > 0 && bytes.below(2) == 0;
         let log_box = Box::<RefCell<Log>>::default();
         let environment = std::ptr::from_ref(&*log_box).cast_mut().cast();
         let (token, path) = (CString::new(fmu.guid()).unwrap(), CString::new(fmu.path()).unwrap());
         let (name, t, p) = (c"attacked".as_ptr(), token.as_ptr(), path.as_ptr());
-        let instance = if exchange {
-            (API.instantiate_model_exchange)(name, t, p, 0, 1, environment, Some(log))
-        } else {
-            (API.instantiate_co_simulation)(name, t, p, 0, 1, 0, 1, null(), 0, environment, Some(log), None)
-        };
+        let instance =
+            (API.instantiate_co_simulation)(name, t, p, 0, 1, 0, 1, null(), 0, environment, Some(log), None);
         assert!(!instance.is_null(), "{}", log_box.borrow().last);
         let (mode, states) = (Mode::INSTANTIATED, Vec::new());
-        Self { fmu, instance, exchange, mode, log: log_box, states, calls: 0, digest: 0 }
+        Self { fmu, instance, mode, log: log_box, states, calls: 0, digest: 0 }
     }
 
     /// Judges an answer; whether the call did as asked.
@@ -95,7 +89,7 @@ impl Slave {
         let failures = std::mem::take(&mut self.log.borrow_mut().failures);
         let last = &self.log.borrow().last;
         assert_eq!(failures, usize::from(status != OK), "{name} answers {status}, last: {last}");
-        let legal = call.is_none_or(|call| self.mode.is_in(call.modes(FmiVersion::Three)));
+        let legal = call.is_none_or(|call| self.mode.is_in(call.modes()));
         assert!(legal || status == ERROR, "{name} in the mode {:?}: {status}", self.mode);
         self.calls += 1;
         self.digest = (self.digest ^ status as u64).wrapping_mul(0x0100_0000_01B3).rotate_left(17);
@@ -151,13 +145,8 @@ fn initialize(slave: &mut Slave, bytes: &mut Bytes) {
     let status =
         (API.enter_initialization_mode)(c, 0, 0.0, start, u8::from(bytes.below(4) == 0), start + 0.5);
     slave.moved("enter", Call::EnterInitializationMode, Mode::INITIALIZATION, status);
-    let running = if slave.exchange { Mode::EVENT } else { Mode::STEP };
     let status = (API.exit_initialization_mode)(c);
-    slave.moved("exit", Call::ExitInitializationMode, running, status);
-    if slave.exchange && bytes.below(4) > 0 {
-        let status = (API.enter_continuous_time_mode)(c);
-        slave.moved("continuous", Call::EnterContinuousTimeMode, Mode::CONTINUOUS, status);
-    }
+    slave.moved("exit", Call::ExitInitializationMode, Mode::STEP, status);
 }
 
 fn call(slave: &mut Slave, bytes: &mut Bytes) {
@@ -310,36 +299,29 @@ fn state(slave: &mut Slave, bytes: &mut Bytes) {
     }
 }
 
-/// Calls of model exchange, on instances of either interface.
+/// Calls of model exchange, which there is not, with whatever arguments.
 fn exchange(slave: &mut Slave, bytes: &mut Bytes) {
-    let (c, n) = (slave.instance, slave.fmu.product.layout.states);
-    let n = if bytes.byte().is_multiple_of(16) { n + 1 } else { n };
-    let mut x: Vec<f64> =
-        (0..n).map(|_| if bytes.below(8) == 0 { bytes.number() } else { bytes.moderate() }).collect();
-    let (p, mut flag, mut time, mut count) = (x.as_mut_ptr(), 7, 0.5, 0);
+    let (c, n) = (slave.instance, bytes.below(5));
+    let mut x: Vec<f64> = (0..n).map(|_| bytes.number()).collect();
+    let p = if bytes.byte().is_multiple_of(16) { null_mut() } else { x.as_mut_ptr() };
+    let (before, mut flag, mut count) = (x.clone(), 7, 7);
     let f = &raw mut flag;
-    let (name, call, status) = match bytes.below(11) {
-        0 => ("time", Call::SetTime, (API.set_time)(c, bytes.number())),
-        1..4 => ("set", Call::Integrate, (API.set_continuous_states)(c, p, n)),
-        4 => ("get", Call::GetContinuousStates, (API.get_continuous_states)(c, p, n)),
-        5 => ("rates", Call::GetContinuousStates, (API.get_continuous_state_derivatives)(c, p, n)),
-        6 => ("completed", Call::Integrate, (API.completed_integrator_step)(c, 0, f, f)),
-        7 => ("indicators", Call::GetContinuousStates, (API.get_event_indicators)(c, null_mut(), 0)),
-        8 => ("nominals", Call::Get, (API.get_nominals_of_continuous_states)(c, p, n)),
-        9 => {
-            let call = Call::UpdateDiscreteStates;
-            ("update", call, (API.update_discrete_states)(c, f, f, f, f, f, &raw mut time))
-        }
-        _ => ("number", Call::Get, (API.get_number_of_continuous_states)(c, &raw mut count)),
+    let status = match bytes.below(11) {
+        0 => (API.set_time)(c, bytes.number()),
+        1 => (API.set_continuous_states)(c, p, n),
+        2 => (API.get_continuous_states)(c, p, n),
+        3 => (API.get_continuous_state_derivatives)(c, p, n),
+        4 => (API.completed_integrator_step)(c, 0, f, f),
+        5 => (API.get_event_indicators)(c, p, n),
+        6 => (API.get_nominals_of_continuous_states)(c, p, n),
+        7 => (API.update_discrete_states)(c, f, f, f, f, f, null_mut()),
+        8 => (API.get_number_of_continuous_states)(c, &raw mut count),
+        9 => (API.enter_event_mode)(c),
+        _ => (API.enter_continuous_time_mode)(c),
     };
-    let done = slave.answered(name, Some(call), status);
-    assert!(!done || slave.exchange, "{name} in co-simulation");
-    if slave.exchange && bytes.below(2) == 0 {
-        let status = (API.enter_event_mode)(c);
-        slave.moved("event", Call::EnterEventMode, Mode::EVENT, status);
-        let status = (API.enter_continuous_time_mode)(c);
-        slave.moved("continuous", Call::EnterContinuousTimeMode, Mode::CONTINUOUS, status);
-    }
+    assert!(!slave.answered("model exchange", None, status));
+    let same = x.iter().zip(&before).all(|(a, b)| a.to_bits() == b.to_bits());
+    assert!(same && (flag, count) == (7, 7), "a refused call wrote something");
 }
 
 fn dependencies(slave: &mut Slave, bytes: &mut Bytes) {

@@ -6,7 +6,6 @@ use std::ptr::{null, null_mut, without_provenance_mut};
 use punctual_fmu::instance::{Call, Mode};
 use punctual_modeldescription::Causality;
 
-use crate::api::exchange::API as EXCHANGED;
 use crate::api::{API, Component, DISCARD, ERROR, OK};
 use crate::bytes::Bytes;
 use crate::campaign;
@@ -261,31 +260,12 @@ fn absent(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
         _ => DISCARD,
     };
     assert_eq!((discarded, int, real.to_bits(), text), (DISCARD, 7, 0.5_f64.to_bits(), null()));
-    let (status, usable) = match bytes.below(4) {
+    let (status, usable) = match bytes.below(3) {
         0 => ((API.cancel_step)(c), false),
-        3 => (exchange(c, bytes), false),
         1 => ((API.set_input_derivatives)(c, refs, count, orders, &raw const real), count == 0),
         _ => ((API.get_output_derivatives)(c, refs, count, orders, &raw mut real), count == 0),
     };
     assert_eq!(machine.answered(k, "what there is not", None, status), usable);
-}
-
-/// A function of model exchange, which no instance here is one of.
-fn exchange(c: Component, bytes: &mut Bytes) -> c_int {
-    let (mut numbers, mut flag) = ([bytes.number(); 4], 7);
-    let (x, f) = (numbers.as_mut_ptr(), &raw mut flag);
-    match bytes.below(10) {
-        0 => (EXCHANGED.enter_event_mode)(c),
-        1 => (EXCHANGED.new_discrete_states)(c, null_mut()),
-        2 => (EXCHANGED.enter_continuous_time_mode)(c),
-        3 => (EXCHANGED.completed_integrator_step)(c, 0, f, f),
-        4 => (EXCHANGED.set_time)(c, bytes.number()),
-        5 => (EXCHANGED.set_continuous_states)(c, x, 4),
-        6 => (EXCHANGED.get_derivatives)(c, x, 4),
-        7 => (EXCHANGED.get_event_indicators)(c, x, 0),
-        8 => (EXCHANGED.get_continuous_states)(c, x, 4),
-        _ => (EXCHANGED.get_nominals_of_continuous_states)(c, x, 4),
-    }
 }
 
 /// Arguments of `fmi2Instantiate` that are refused, without anybody to tell.
@@ -297,7 +277,7 @@ fn refused_instance(bytes: &mut Bytes) {
     let (good, place, odd) = (good.as_ptr(), place.as_ptr(), odd.as_ptr());
     let name = bytes.pick(&[null(), odd, c"%s%n".as_ptr()]);
     let (kind, guid, location) = bytes.pick(&[
-        (-1, good, place),
+        (0, good, place),
         (7, good, place),
         (1, odd, place),
         (1, good, null()),

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use crate::fmu::{FILTER, Fmu, PLANT};
 
 /// The configurations; also what `configurations` starts from.
-pub(crate) const CONFIGURATIONS: [&str; 12] = [
+pub(crate) const CONFIGURATIONS: [&str; 11] = [
     FILTER,
     PLANT,
     include_str!("../../examples/vehicles/unicycle-filter.toml"),
@@ -17,7 +17,6 @@ pub(crate) const CONFIGURATIONS: [&str; 12] = [
     BICYCLE,
     DAMPING,
     HEADING,
-    EXCHANGED,
 ];
 
 /// Goals one after the other, an obstacle, a soft limit; outputs by steps only.
@@ -75,8 +74,6 @@ const DAMPING: &str =
     "kind = \"controller\"\ncontroller = \"damping\"\nplant.model = \"bicycle_kinematic\"\n";
 const HEADING: &str = "kind = \"controller\"\ncontroller = \"heading\"\ngoal = [1.0, 2.0]\n\
                        goal_input = true\nplant.model = \"point_mass\"\n";
-
-const EXCHANGED: &str = "kind = \"plant\"\nplant.model = \"point_mass\"\nexperiment.model_exchange = true\n";
 
 /// Those that can be instantiated, extracted once.
 pub(crate) static FLEET: LazyLock<Vec<Fmu>> =

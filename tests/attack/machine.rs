@@ -4,7 +4,7 @@ use std::ffi::c_int;
 use std::ptr::null_mut;
 
 use punctual_core::filter::Status;
-use punctual_fmu::configuration::{Configuration, FmiVersion};
+use punctual_fmu::configuration::Configuration;
 use punctual_fmu::instance::{Call, Mode};
 use punctual_modeldescription::Causality;
 
@@ -63,7 +63,7 @@ impl Machine {
     #[track_caller]
     pub(crate) fn answered(&mut self, k: usize, name: &str, call: Option<Call>, status: c_int) -> bool {
         let done = self.slots[k].instance.answered(name, status);
-        let legal = call.is_none_or(|call| self.slots[k].instance.mode.is_in(call.modes(FmiVersion::Two)));
+        let legal = call.is_none_or(|call| self.slots[k].instance.mode.is_in(call.modes()));
         assert!(legal || !done, "{name} in the mode {:?}", self.slots[k].instance.mode);
         self.calls += 1;
         self.note(u64::from(done));
@@ -74,7 +74,7 @@ impl Machine {
     /// where legal.
     #[track_caller]
     pub(crate) fn moved(&mut self, k: usize, call: Call, to: Mode, usable: bool, status: c_int) {
-        let legal = self.slots[k].instance.mode.is_in(call.modes(FmiVersion::Two));
+        let legal = self.slots[k].instance.mode.is_in(call.modes());
         let done = self.answered(k, &format!("{call:?}"), Some(call), status);
         assert!(done || !(legal && usable), "{call:?} in the mode {:?}", self.slots[k].instance.mode);
         if done {
@@ -103,7 +103,7 @@ impl Machine {
         let values: Vec<f64> = references.iter().map(|_| value()).collect();
         let c = slot.instance.component;
         let status = (API.set_real)(c, references.as_ptr(), values.len(), values.as_ptr());
-        let legal = slot.instance.mode.is_in(Call::Set.modes(FmiVersion::Two));
+        let legal = slot.instance.mode.is_in(Call::Set.modes());
         let done = self.answered(k, "set_real", Some(Call::Set), status);
         assert_eq!(done, legal, "inputs take any number");
     }

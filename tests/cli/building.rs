@@ -69,49 +69,6 @@ fn both_versions_of_fmi() {
     workshop.punctual(["build", "filter.toml", "-o", "n.ssp", "--fmi", "3"]).fails(2, message);
 }
 
-/// A plant of FMI 2.0 offers model exchange where that is asked for, and is else what it was.
-#[test]
-fn a_plant_with_model_exchange() {
-    let workshop = workshop();
-    let plant = "kind = \"plant\"\nplant.model = \"unicycle\"\n";
-    workshop.write("plant.toml", plant);
-    workshop.write("asked.toml", format!("{plant}experiment.model_exchange = true\n"));
-    workshop.punctual(["build", "plant.toml", "-o", "x.fmu"]).success();
-    assert!(!workshop.punctual(["inspect", "x.fmu"]).success().contains("model exchange"));
-    workshop.punctual(["build", "plant.toml", "-o", "y.fmu", "--model-exchange"]).success();
-    workshop.punctual(["build", "asked.toml", "-o", "z.fmu"]).success();
-    assert!(workshop.bytes("y.fmu") == workshop.bytes("z.fmu"), "the same file");
-    workshop.punctual(["validate", "y.fmu"]).success();
-    let shown = workshop.punctual(["inspect", "y.fmu"]).success();
-    for line in [
-        "interfaces  model exchange, co-simulation\n",
-        "states      x.x_p, x.y_p, x.theta, x.v\n",
-        "can         save and restore its state, serialise its state, give directional derivatives (in model exchange)\n",
-    ] {
-        assert!(shown.contains(line), "{line} in {shown}");
-    }
-    let json = workshop.punctual(["inspect", "--json", "y.fmu"]).success();
-    let report: serde_json::Value = serde_json::from_str(&json).expect("JSON");
-    assert_eq!(report["model_exchange"]["completed_integrator_step_not_needed"], true);
-    assert_eq!(report["states"], serde_json::json!(["x.x_p", "x.y_p", "x.theta", "x.v"]));
-    // Both versions; who cannot says so.
-    workshop.punctual(["build", "asked.toml", "-o", "both.fmu", "--fmi", "both"]).success();
-    assert!(workshop.punctual(["inspect", "both-fmi3.fmu"]).success().contains("model exchange"));
-    let refused = |file: &str, why: &str| {
-        let done = workshop.punctual(["build", file, "-o", "n.fmu", "--model-exchange"]);
-        let message = format!(
-            "{file}: --model-exchange: is true, must be false: there is no model exchange here, {why}"
-        );
-        done.fails(2, &message);
-    };
-    refused("filter.toml", "which plants alone have; a filter and a controller are stepped");
-    workshop.write("noisy.toml", format!("{plant}[disturbance]\nmeasurements = {{ v = 0.1 }}\n"));
-    refused("noisy.toml", "since a plant with `[disturbance]` has to be stepped; leave one of the two out");
-    let message =
-        "--model-exchange: is for one FMU; an .ssp file takes the FMUs that the system names as they are";
-    workshop.punctual(["build", "filter.toml", "-o", "n.ssp", "--model-exchange"]).fails(2, message);
-}
-
 #[test]
 fn the_option_goes_before_the_variable() {
     let workshop = workshop().with_variable("PUNCTUAL_FMU_LIBRARY", "nowhere.so");

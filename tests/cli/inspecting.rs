@@ -2,6 +2,7 @@
 
 use serde_json::Value;
 
+use crate::misbehaving;
 use crate::workshop::{Workshop, assert_golden, without_guids};
 
 #[test]
@@ -63,4 +64,32 @@ fn what_breaks_the_standard_is_noted_on_stderr() {
         done.stderr.starts_with("note: modelDescription.xml: ") && done.stderr.contains("u.a"),
         "{done:?}"
     );
+}
+
+#[test]
+fn an_fmu_with_both_interfaces() {
+    let workshop = Workshop::new();
+    let exchange = "<ModelExchange modelIdentifier=\"misbehaving\" completedIntegratorStepNotNeeded=\"true\" \
+                    providesDirectionalDerivative=\"true\"/><CoSimulation";
+    let rate = "<ScalarVariable name=\"der(y)\" valueReference=\"3\"><Real derivative=\"1\"/></ScalarVariable></ModelVariables>";
+    let edits = [
+        ("<CoSimulation", exchange),
+        ("</ModelVariables>", rate),
+        ("</Outputs>", "</Outputs><Derivatives><Unknown index=\"5\"/></Derivatives>"),
+        ("</InitialUnknowns>", "<Unknown index=\"5\"/></InitialUnknowns>"),
+    ];
+    misbehaving::write(&workshop, "x.fmu", misbehaving::description("none", &edits), &[]);
+    let shown = workshop.punctual(["inspect", "x.fmu"]).success();
+    for line in [
+        "interfaces  model exchange, co-simulation\n",
+        "states      y\n",
+        "can         give directional derivatives (in model exchange)\n",
+        "can         take steps of any length (in co-simulation)\n",
+    ] {
+        assert!(shown.contains(line), "{line} in {shown}");
+    }
+    let json = workshop.punctual(["inspect", "--json", "x.fmu"]).success();
+    let report: Value = serde_json::from_str(&json).expect("JSON");
+    assert_eq!(report["model_exchange"]["completed_integrator_step_not_needed"], true);
+    assert_eq!(report["states"], serde_json::json!(["y"]));
 }

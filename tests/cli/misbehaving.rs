@@ -70,44 +70,24 @@ fn compile(source: &str, macros: &[String]) -> Vec<u8> {
 
 /// Writes the FMU with this description and library.
 pub(crate) fn write(workshop: &Workshop, name: &str, xml: impl Into<Vec<u8>>, library: &[u8]) {
-    put(workshop, name, xml, (&format!("{PLATFORM}/misbehaving"), library), &[]);
+    put(workshop, name, xml, (&format!("{PLATFORM}/misbehaving"), library));
 }
 
 /// Writes the FMU with this description and its library at this place, without its ending, below `binaries/`.
 pub(crate) fn write_at(workshop: &Workshop, name: &str, xml: impl Into<Vec<u8>>, place: &str) {
-    put(workshop, name, xml, (place, &library(&[])), &[]);
+    put(workshop, name, xml, (place, &library(&[])));
 }
 
 /// Writes the FMU of FMI 3.0 with this description, its library compiled with these macros.
 pub(crate) fn write_sundry(workshop: &Workshop, name: &str, xml: impl Into<Vec<u8>>, macros: &[&str]) {
     let library = compiled("sundry.c", macros);
-    put(workshop, name, xml, (&format!("{}/sundry", fmi3::PLATFORM), &library), &[]);
+    put(workshop, name, xml, (&format!("{}/sundry", fmi3::PLATFORM), &library));
 }
 
-/// Writes it with further entries.
-pub(crate) fn write_with(
-    workshop: &Workshop,
-    name: &str,
-    xml: impl Into<Vec<u8>>,
-    entries: &[(String, &str)],
-) {
-    let library = compiled("sundry.c", &[]);
-    put(workshop, name, xml, (&format!("{}/sundry", fmi3::PLATFORM), &library), entries);
-}
-
-fn put(
-    workshop: &Workshop,
-    name: &str,
-    xml: impl Into<Vec<u8>>,
-    (place, library): (&str, &[u8]),
-    entries: &[(String, &str)],
-) {
+fn put(workshop: &Workshop, name: &str, xml: impl Into<Vec<u8>>, (place, library): (&str, &[u8])) {
     let mut archive = Archive::new();
     archive.add("modelDescription.xml", xml).expect("an entry");
     let suffix = std::env::consts::DLL_SUFFIX;
     archive.add(&format!("binaries/{place}{suffix}"), library).expect("an entry");
-    for (place, text) in entries {
-        archive.add(place, *text).expect("an entry");
-    }
     workshop.write(name, archive.to_bytes().expect("an archive"));
 }

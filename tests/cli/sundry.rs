@@ -4,7 +4,7 @@
 use crate::misbehaving::{self, description, sundry, write_sundry};
 use crate::table::Table;
 use crate::validating::listed;
-use crate::workshop::{Done, Workshop, examples};
+use crate::workshop::{Done, Workshop};
 
 /// One FMU of FMI 3.0 feeds another, which has this defect and these macros.
 fn workshop(defect: &str, macros: &[&str]) -> Workshop {
@@ -446,67 +446,4 @@ fn a_trial_needs_what_it_can_run() {
     let skipped =
         "note: not examined: the trial: it has clocks (tick), which need an importer with event mode";
     assert!(done.code == 0 && done.stderr.starts_with(skipped), "{done:#?}");
-}
-
-const MANIFEST: &str = r#"<fmiReferences xmlns:fmi-ls="http://fmi-standard.org/fmi-ls-manifest" fmi-ls:fmi-ls-name="org.fmi-standard.fmi-ls-ref" fmi-ls:fmi-ls-version="1.0.0-alpha.1" fmi-ls:fmi-ls-description="Layered Standard providing information on related files included in an FMU.">
-<Related type="text/csv" source="in.csv" role="testcase"/><Related type="text/csv" source="out.csv" role="result"/></fmiReferences>"#;
-
-/// The findings on an FMU with this defect that carries these results, y by Euler steps of 0.1 s.
-fn referred(defect: &str, results: &str, options: &[&str]) -> Vec<String> {
-    let workshop = Workshop::new();
-    let folder = "extra/org.fmi-standard.fmi-ls-ref";
-    let files = [
-        (format!("{folder}/fmi-ls-manifest.xml"), MANIFEST),
-        (format!("{folder}/in.csv"), "time,u\n0,1 2\n0.1,3 4\n"),
-        (format!("{folder}/out.csv"), results),
-    ];
-    misbehaving::write_with(&workshop, "x.fmu", sundry(defect, &[]), &files);
-    listed(&workshop, &[&["--references"], options].concat()).1
-}
-
-#[test]
-fn results_that_an_fmu_carries_are_compared() {
-    let sound =
-        "time,y,z,out_string\n0,0 0,3,ready\n0.1,0.1 0.2,3,ready\n0.2,0.4 0.6000000000000001,7,ready\n";
-    assert_eq!(referred("none", sound, &[]), [""; 0]);
-    let other = sound.replace("0.4 0.6000000000000001", "0.4 0.61");
-    let finding = "error trial.references trial y, element 2: is 0.6000000000000001 at t = 0.2 s, where its reference is \
-                   0.61; allowed is a share of 0";
-    assert_eq!(referred("none", &other, &[]), [finding]);
-    assert_eq!(referred("none", &other, &["--tolerance", "0.02"]), [""; 0]);
-    // Where there is no derivative to compare, results are.
-    assert_eq!(referred("no-derivative", sound, &[]), [""; 0]);
-    assert_eq!(referred("no-derivative", &other, &[]), [finding]);
-    let longer = format!("{sound}0.3,0.7 1,7,ready\n");
-    let stopped = referred("discard-in-step", &longer, &[]);
-    let cannot = "error trial.references trial: cannot be compared: fmi3DoStep of references (x.fmu) at t = 0.2 s returned ";
-    assert!(stopped.iter().any(|found| found.starts_with(cannot)), "{stopped:#?}");
-    for (results, expected) in [
-        ("time,none\n0,1\n", "x.fmu: its references: there is no variable \"none\" that is a number"),
-        ("time,y\n0,1\n", "x.fmu: its references: y has 1 numbers in a row; must have 2"),
-        ("time,z\n0\n", "x.fmu: its references: out.csv: line 2 has 1 fields; must have 2"),
-    ] {
-        assert_eq!(referred("none", results, &[]), [format!("error trial.references trial: {expected}")]);
-    }
-    let (code, found) = tried("none", &[], &["--references"]);
-    let none =
-        "error trial.references trial: the FMU carries no references, so there is nothing to compare with";
-    assert_eq!((code, found), (1, vec![none.to_owned()]));
-}
-
-#[test]
-fn what_is_built_with_references_keeps_to_them() {
-    let workshop = Workshop::new();
-    workshop
-        .write("filter.toml", std::fs::read(examples().join("unicycle-filter.toml")).expect("the example"));
-    for name in ["a.fmu", "b.fmu"] {
-        workshop.punctual(["build", "filter.toml", "-o", name, "--fmi", "both", "--references"]).success();
-    }
-    for [a, b] in [["a.fmu", "b.fmu"], ["a-fmi3.fmu", "b-fmi3.fmu"]] {
-        assert_eq!(
-            workshop.punctual(["validate", "--references", a]).success(),
-            format!("{a}: no errors, no warnings\n")
-        );
-        assert!(workshop.bytes(a) == workshop.bytes(b), "{a}");
-    }
 }

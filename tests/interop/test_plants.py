@@ -1,15 +1,11 @@
 """Plants alone, in FMPy's own simulation loop, against closed solutions."""
 
-import json
 import math
 
 import fmpy
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
-from fmpy.validation import validate_fmu
-
-from conftest import punctual
 
 # The classical Runge-Kutta method is exact on polynomials of degree 4, so only round-off is left:
 # 2,000 steps of numbers of order 100.
@@ -63,59 +59,6 @@ def test_default_experiment_is_used(demo):
     description = fmpy.read_model_description(fmu(demo, "unicycle"))
     assert float(description.defaultExperiment.stopTime) == 20.0
     assert float(description.defaultExperiment.stepSize) == 0.001
-
-
-# The car by a formula, with an output that depends on states and time.
-CAR = """
-kind = "plant"
-x0 = { s = 1.0, v = 2.0 }
-output = [{ name = "ahead", expression = "s + 0.1*v*t", unit = "1" }]
-[plant]
-states = [{ name = "s", unit = "1" }, { name = "v", unit = "1" }]
-inputs = [{ name = "f", unit = "1" }]
-derivatives = { s = "v", v = "f - 0.3*v*abs(v)" }
-"""
-EXCHANGED = {
-    "point_mass": {"x0.v_x": 3.0, "u.u_x": 0.5, "u.u_y": 4.0},
-    "unicycle": {"x0.v": 2.0, "u.a": 0.5, "u.omega": 1.0},
-    "bicycle": {"x0.v": 3.0, "u.a": 0.2, "u.beta": 0.2},
-    "car": {"x0.v": 2.0, "u.f": 0.5},
-}
-# CVode at a relative tolerance of 1e-8, our plant with steps of 1 ms: both are within this of the motion.
-SOLVED = 1e-5
-# FMPy's Euler method has a step for each output. After t = 2 s it is off by about t/2 times the step times a second derivative
-# of up to 5.
-EULER_STEP = 1e-3
-EULER = 2 * 5 * EULER_STEP
-
-
-def difference(one, other):
-    names = [name for name in one.dtype.names if name.startswith(("x.", "y."))]
-    assert names and np.array_equal(one["time"], other["time"])
-    return max(np.abs(one[name] - other[name]).max() for name in names)
-
-
-@pytest.mark.parametrize("model", EXCHANGED)
-def test_a_plant_is_integrated_by_the_solver_of_the_tool(tmp_path, model):
-    configuration = tmp_path / "plant.toml"
-    configuration.write_text(CAR if model == "car" else f'kind = "plant"\nplant.model = "{model}"\n')
-    path = str(tmp_path / "plant.fmu")
-    punctual("build", configuration, "-o", path, "--model-exchange")
-    assert validate_fmu(path) == []
-    report = json.loads(punctual("validate", path, "--json").stdout)
-    assert (report["findings"], report["not_examined"]) == ([], [])
-    description = fmpy.read_model_description(path)
-    states = [derivative.variable.derivative.name for derivative in description.derivatives]
-    assert states == [v.name for v in description.modelVariables if v.name.startswith("x.")]
-    assert description.numberOfEventIndicators == 0
-    run = {"start_values": EXCHANGED[model], "stop_time": 2.0, "output_interval": 0.125}
-    stepped = simulate_fmu(path, fmi_type="CoSimulation", **run)
-    solved = simulate_fmu(path, fmi_type="ModelExchange", solver="CVode", relative_tolerance=1e-8, **run)
-    assert difference(solved, stepped) < SOLVED
-    run["output_interval"] = EULER_STEP
-    stepped = simulate_fmu(path, fmi_type="CoSimulation", **run)
-    coarse = simulate_fmu(path, fmi_type="ModelExchange", solver="Euler", **run)
-    assert difference(coarse, stepped) < EULER
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf])

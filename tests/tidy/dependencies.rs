@@ -295,7 +295,6 @@ fn each_dependency_is_named_in_one_place() {
                 "src/host/description/",
                 "src/package/difference.rs",
                 "src/command/inspect",
-                "src/references.rs",
             ],
         ),
         (&["svg", ":", ":"], &["src/plot/canvas.rs"]),

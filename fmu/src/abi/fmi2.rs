@@ -1,5 +1,5 @@
-//! The C interface of FMI 2.0: the types of `fmi2TypesPlatform.h` and `fmi2FunctionTypes.h`, one table of the functions
-//! of co-simulation, and one of those that model exchange adds. All code that exports, calls or looks for them takes them from here.
+//! The C interface of FMI 2.0: the types of `fmi2TypesPlatform.h` and `fmi2FunctionTypes.h`, and one table of the
+//! functions of co-simulation. All code that exports, calls or looks for them takes them from here.
 
 use std::ffi::{c_char, c_int, c_uint, c_void};
 use std::fmt;
@@ -23,8 +23,6 @@ pub type StatusKind = c_int;
 pub const TRUE: Boolean = 1;
 /// `fmi2False`.
 pub const FALSE: Boolean = 0;
-/// `fmi2ModelExchange` of `fmi2Type`.
-pub const MODEL_EXCHANGE: c_int = 0;
 /// `fmi2CoSimulation` of `fmi2Type`.
 pub const CO_SIMULATION: c_int = 1;
 /// `fmi2LastSuccessfulTime` of `fmi2StatusKind`.
@@ -88,24 +86,6 @@ pub struct CallbackFunctions {
     pub step_finished: Option<unsafe extern "C" fn(Environment, Status)>,
     /// Handed back to `logger`.
     pub environment: Environment,
-}
-
-/// `fmi2EventInfo`: what has come of an event.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(C)]
-pub struct EventInfo {
-    /// The event goes on: call again.
-    pub new_discrete_states_needed: Boolean,
-    /// The run is over.
-    pub terminate_simulation: Boolean,
-    /// The sizes of the states are others.
-    pub nominals_of_continuous_states_changed: Boolean,
-    /// The states have jumped.
-    pub values_of_continuous_states_changed: Boolean,
-    /// The time of the next event is known.
-    pub next_event_time_defined: Boolean,
-    /// That time in s.
-    pub next_event_time: f64,
 }
 
 /// Hands the 34 functions of FMI 2.0 co-simulation to the macro `$with`, a row each: a name in snake case, the
@@ -180,51 +160,16 @@ macro_rules! fmi2_functions {
     };
 }
 
-/// Hands the 10 functions that model exchange adds in FMI 2.0 to the macro `$with`, as `fmi2_functions!` does.
-#[macro_export]
-macro_rules! fmi2_exchange_functions {
-    ($with:ident) => {
-        $with! {
-            enter_event_mode EnterEventMode fmi2EnterEventMode (Component) -> Status;
-            new_discrete_states NewDiscreteStates fmi2NewDiscreteStates (Component, *mut EventInfo) -> Status;
-            enter_continuous_time_mode EnterContinuousTimeMode fmi2EnterContinuousTimeMode
-                (Component) -> Status;
-            completed_integrator_step CompletedIntegratorStep fmi2CompletedIntegratorStep
-                (Component, Boolean, *mut Boolean, *mut Boolean) -> Status;
-            set_time SetTime fmi2SetTime (Component, f64) -> Status;
-            set_continuous_states SetContinuousStates fmi2SetContinuousStates
-                (Component, *const f64, usize) -> Status;
-            get_derivatives GetDerivatives fmi2GetDerivatives (Component, *mut f64, usize) -> Status;
-            get_event_indicators GetEventIndicators fmi2GetEventIndicators
-                (Component, *mut f64, usize) -> Status;
-            get_continuous_states GetContinuousStates fmi2GetContinuousStates
-                (Component, *mut f64, usize) -> Status;
-            get_nominals_of_continuous_states GetNominalsOfContinuousStates fmi2GetNominalsOfContinuousStates
-                (Component, *mut f64, usize) -> Status;
-        }
-    };
-}
-
 macro_rules! types {
     ($($field:ident $type:ident $symbol:ident ($($argument:ty),*) -> $result:ty;)*) => {
         $(
             #[doc = concat!("`", stringify!($symbol), "`.")]
             pub type $type = unsafe extern "C" fn($($argument),*) -> $result;
         )*
-    };
-}
 
-macro_rules! names {
-    ($($field:ident $type:ident $symbol:ident ($($argument:ty),*) -> $result:ty;)*) => {
-        &[$(stringify!($symbol)),*]
+        /// The names of the functions of co-simulation.
+        pub const FUNCTIONS: &[&str] = &[$(stringify!($symbol)),*];
     };
 }
 
 fmi2_functions!(types);
-fmi2_exchange_functions!(types);
-
-/// The names of the functions of co-simulation.
-pub const FUNCTIONS: &[&str] = fmi2_functions!(names);
-
-/// The names of the functions that model exchange adds.
-pub const EXCHANGE_FUNCTIONS: &[&str] = fmi2_exchange_functions!(names);

@@ -35,8 +35,6 @@ pub(super) trait Answer: Copy {
     const FMI: FmiVersion;
     /// Done.
     const OK: Self;
-    /// Not done; the run may go on.
-    const DISCARD: Self;
     /// Not done.
     const ERROR: Self;
 }
@@ -44,14 +42,12 @@ pub(super) trait Answer: Copy {
 impl Answer for fmi2::Status {
     const FMI: FmiVersion = FmiVersion::Two;
     const OK: Self = Self::OK;
-    const DISCARD: Self = Self::DISCARD;
     const ERROR: Self = Self::ERROR;
 }
 
 impl Answer for fmi3::Status {
     const FMI: FmiVersion = FmiVersion::Three;
     const OK: Self = Self::OK;
-    const DISCARD: Self = Self::DISCARD;
     const ERROR: Self = Self::ERROR;
 }
 

@@ -12,7 +12,6 @@
 pub mod fmi2;
 #[macro_use]
 pub mod fmi3;
-mod exchange;
 #[cfg(old_glibc)]
 mod glibc;
 mod guard;
@@ -53,17 +52,14 @@ pub use plugin::{PluginFolder, file_name};
 use guard::{Answer, Handle, catch, install_panic_hook, slice, text};
 use logger::Logger;
 
-use crate::configuration::{Configuration, FmiVersion};
+use crate::configuration::FmiVersion;
 use crate::instance::{Failure, Instance};
-
-/// Makes an instance for one of the interfaces, for a token.
-type Made = fn(Configuration, &str) -> Result<Instance, Failure>;
 
 /// A new instance behind a pointer, or NULL with a log message under `name`. `arguments` checks what the importer said,
 /// and gives the token of the FMU and the place of its resources.
 fn instantiated(
     name: &str,
-    (made, fmi): (Made, FmiVersion),
+    fmi: FmiVersion,
     logger: Logger,
     arguments: impl FnOnce() -> Result<(String, String), Failure>,
 ) -> *mut c_void {
@@ -76,7 +72,7 @@ fn instantiated(
             let (found, asked) = (found.name(), fmi.name());
             return Err(format!("the FMU is one of FMI {found}, which has no instance of FMI {asked}"));
         }
-        made(configuration, &token)
+        Instance::new(configuration, &token)
     });
     match built.and_then(|result| result) {
         Ok(instance) => {

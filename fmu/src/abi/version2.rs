@@ -1,19 +1,14 @@
-//! The 34 functions of FMI 2.0 co-simulation and the 10 that model exchange adds. Those of states are in
-//! [`states`](super::states), most of those of model exchange in `exchange`.
+//! The 34 functions of FMI 2.0 co-simulation. Those of states are in [`states`](super::states).
 //!
 //! `fmi2Warning`, `fmi2Fatal` and `fmi2Pending` are never returned. Several importers take a warning for a
 //! failure, and no failure leaves an instance that could not be freed. `fmi2Discard` means that a status asked
-//! for does not exist, or that a continuous state or its rate is no number.
+//! for does not exist.
 
 use std::ffi::{CString, c_int};
 
-use super::exchange::{
-    fmi2CompletedIntegratorStep, fmi2GetContinuousStates, fmi2GetDerivatives, fmi2GetEventIndicators,
-    fmi2GetNominalsOfContinuousStates, fmi2SetContinuousStates, fmi2SetTime,
-};
 use super::fmi2::{
-    self, Boolean, CO_SIMULATION, CallbackFunctions, Component, EventInfo, FALSE, LAST_SUCCESSFUL_TIME,
-    MODEL_EXCHANGE, Status, StatusKind, TERMINATED, Text, ValueReference,
+    self, Boolean, CO_SIMULATION, CallbackFunctions, Component, LAST_SUCCESSFUL_TIME, Status, StatusKind,
+    TERMINATED, Text, ValueReference,
 };
 use super::guard::{Handle, guarded, none, slice, slice_mut, text};
 use super::logger::Logger;
@@ -21,10 +16,10 @@ use super::states::{
     fmi2DeSerializeFMUstate, fmi2FreeFMUstate, fmi2GetFMUstate, fmi2SerializeFMUstate,
     fmi2SerializedFMUstateSize, fmi2SetFMUstate,
 };
-use super::{Made, free, instantiated, switch};
+use super::{free, instantiated, switch};
 
 use crate::configuration::FmiVersion;
-use crate::instance::{Call, Instance, Mode};
+use crate::instance::{Call, Mode};
 
 /// Defines exports with the types of the standard.
 macro_rules! exported {
@@ -34,7 +29,6 @@ macro_rules! exported {
 }
 
 fmi2_functions!(exported);
-fmi2_exchange_functions!(exported);
 
 /// Returns `"default"`: the types of `fmi2TypesPlatform.h`.
 #[unsafe(no_mangle)]
@@ -73,11 +67,10 @@ unsafe extern "C" fn fmi2Instantiate(
     let guid = unsafe { text(guid) };
     // SAFETY: the caller's contract for strings.
     let location = unsafe { text(resource_location) };
-    let made = if fmu_type == MODEL_EXCHANGE { Instance::for_model_exchange } else { Instance::new as Made };
-    instantiated("fmi2Instantiate", (made, FmiVersion::Two), logger, || {
-        if ![MODEL_EXCHANGE, CO_SIMULATION].contains(&fmu_type) {
+    instantiated("fmi2Instantiate", FmiVersion::Two, logger, || {
+        if fmu_type != CO_SIMULATION {
             return Err(format!(
-                "fmuType is {fmu_type}, must be 0 (fmi2ModelExchange) or 1 (fmi2CoSimulation)"
+                "fmuType is {fmu_type}, must be 1 (fmi2CoSimulation): the FMU is one of co-simulation"
             ));
         }
         let guid = guid.ok_or("fmuGUID is NULL")?;
@@ -140,16 +133,12 @@ plain! {
     Status;
     /// Goes to initialization mode.
     fmi2EnterInitializationMode => |handle| handle.instance.enter_initialization_mode();
-    /// Takes the parameters over and goes to step mode, or in model exchange to event mode.
+    /// Takes the parameters over and goes to step mode.
     fmi2ExitInitializationMode => |handle| {
         handle.instance.exit_initialization_mode()?;
         handle.logger.event("initialized");
         Ok(())
     };
-    /// Goes to event mode.
-    fmi2EnterEventMode => |handle| handle.instance.enter_event_mode();
-    /// Goes to continuous-time mode.
-    fmi2EnterContinuousTimeMode => |handle| handle.instance.enter_continuous_time_mode();
     /// Ends the run.
     fmi2Terminate => |handle| handle.instance.terminate();
     /// Goes back to the instantiated state.
@@ -273,31 +262,6 @@ unsafe extern "C" fn fmi2GetDirectionalDerivative(
     };
     // SAFETY: the caller's contract for components.
     unsafe { guarded(component, "fmi2GetDirectionalDerivative", body) }
-}
-
-/// Ends an event: nothing has changed, and no event is known to come.
-///
-/// # Safety
-///
-/// See the module; `info` is NULL or writable.
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2NewDiscreteStates(component: Component, info: *mut EventInfo) -> Status {
-    let body = |handle: &mut Handle| {
-        // SAFETY: the caller's contract for the pointer.
-        let info = unsafe { slice_mut("fmi2eventInfo", info, 1) }?;
-        handle.instance.update_discrete_states()?;
-        info[0] = EventInfo {
-            new_discrete_states_needed: FALSE,
-            terminate_simulation: FALSE,
-            nominals_of_continuous_states_changed: FALSE,
-            values_of_continuous_states_changed: FALSE,
-            next_event_time_defined: FALSE,
-            next_event_time: 0.0,
-        };
-        Ok(Status::OK)
-    };
-    // SAFETY: the caller's contract for components.
-    unsafe { guarded(component, "fmi2NewDiscreteStates", body) }
 }
 
 /// Makes a communication step. The last argument is ignored: importers pass true while rolling back.

@@ -1,19 +1,13 @@
-//! The 75 functions of FMI 3.0. Those of FMU states are in [`states`](super::states), those of model exchange in
-//! `exchange` beside and below, those of features that our FMUs do not have in [`absent`].
+//! The 75 functions of FMI 3.0. Those of FMU states are in [`states`](super::states), those of features that our
+//! FMUs do not have in [`absent`].
 //!
-//! `fmi3Warning` and `fmi3Fatal` are never returned. `fmi3Discard` means that a derivative does not exist here, or that a
-//! continuous state is no number; the run may go on.
+//! `fmi3Warning` and `fmi3Fatal` are never returned. `fmi3Discard` means that a derivative does not exist here; the run may
+//! go on.
 
 mod absent;
-mod exchange;
 
 use std::ptr;
 
-use super::exchange::{
-    done_or_discarded, fmi3CompletedIntegratorStep, fmi3GetContinuousStateDerivatives,
-    fmi3GetContinuousStates, fmi3GetEventIndicators, fmi3GetNominalsOfContinuousStates,
-    fmi3SetContinuousStates, fmi3SetTime,
-};
 use super::fmi3::{
     self, Boolean, ClockUpdate, DEPENDENT, DependencyKind, Environment, FALSE, Instance, IntermediateUpdate,
     LogMessage, Preemption, Status, Text, ValueReference,
@@ -24,12 +18,10 @@ use super::states::{
     fmi3DeserializeFMUState, fmi3FreeFMUState, fmi3GetFMUState, fmi3SerializeFMUState,
     fmi3SerializedFMUStateSize, fmi3SetFMUState,
 };
-use super::{Made, free, instantiated, switch};
+use super::{free, instantiated, switch};
 use absent::*;
-use exchange::*;
 
 use crate::configuration::FmiVersion;
-use crate::instance::Failure;
 
 /// Defines exports with the types of the standard.
 macro_rules! exported {
@@ -71,7 +63,7 @@ unsafe extern "C" fn fmi3InstantiateCoSimulation(
     // SAFETY: the caller's contract for strings.
     let path = unsafe { text(resource_path) };
     let logger = Logger::of_fmi3(log_message, environment, logging_on != FALSE);
-    instantiated("fmi3InstantiateCoSimulation", (Own::new as Made, FmiVersion::Three), logger, || {
+    instantiated("fmi3InstantiateCoSimulation", FmiVersion::Three, logger, || {
         if event_mode_used != FALSE {
             return Err("eventModeUsed is true, must be false: hasEventMode is false".to_owned());
         }
@@ -81,17 +73,12 @@ unsafe extern "C" fn fmi3InstantiateCoSimulation(
                  since there are no intermediate updates"
             ));
         }
-        told(token, path)
+        let token = token.ok_or("instantiationToken is NULL")?;
+        Ok((token, path.ok_or("resourcePath is NULL, must be the folder with the FMU's configuration")?))
     })
 }
 
-/// The token of the FMU and the place of its resources, which no instance can do without.
-fn told(token: Option<String>, path: Option<String>) -> Result<(String, String), Failure> {
-    let token = token.ok_or("instantiationToken is NULL")?;
-    Ok((token, path.ok_or("resourcePath is NULL, must be the folder with the FMU's configuration")?))
-}
-
-/// Makes a new instance whose states the importer integrates, or returns NULL with a log message.
+/// Makes no instance: returns NULL with a log message.
 ///
 /// # Safety
 ///
@@ -99,20 +86,16 @@ fn told(token: Option<String>, path: Option<String>) -> Result<(String, String),
 #[unsafe(no_mangle)]
 unsafe extern "C" fn fmi3InstantiateModelExchange(
     _instance_name: Text,
-    token: Text,
-    resource_path: Text,
+    _token: Text,
+    _resource_path: Text,
     _visible: Boolean,
     logging_on: Boolean,
     environment: Environment,
     log_message: LogMessage,
 ) -> Instance {
-    // SAFETY: the caller's contract for strings.
-    let token = unsafe { text(token) };
-    // SAFETY: the caller's contract for strings.
-    let path = unsafe { text(resource_path) };
     let logger = Logger::of_fmi3(log_message, environment, logging_on != FALSE);
-    let made = (Own::for_model_exchange as Made, FmiVersion::Three);
-    instantiated("fmi3InstantiateModelExchange", made, logger, || told(token, path))
+    logger.error("fmi3InstantiateModelExchange: the FMU has no model exchange");
+    ptr::null_mut()
 }
 
 /// Makes no instance: returns NULL with a log message.
@@ -191,16 +174,12 @@ unsafe extern "C" fn fmi3EnterInitializationMode(
 
 plain! {
     Status;
-    /// Takes the parameters over and goes to step mode; in model exchange to event mode.
+    /// Takes the parameters over and goes to step mode.
     fmi3ExitInitializationMode => |handle| {
         handle.instance.exit_initialization_mode()?;
         handle.logger.event("initialized");
         Ok(())
     };
-    /// Goes to event mode.
-    fmi3EnterEventMode => |handle| handle.instance.enter_event_mode();
-    /// Goes to continuous-time mode.
-    fmi3EnterContinuousTimeMode => |handle| handle.instance.enter_continuous_time_mode();
     /// Ends the run.
     fmi3Terminate => |handle| handle.instance.terminate();
     /// Goes back to the instantiated state.
@@ -291,8 +270,13 @@ macro_rules! derivatives {
                 let seed = unsafe { slice("seed", seed, seed_count) }?;
                 // SAFETY: the caller's contract for arrays.
                 let result = unsafe { slice_mut("sensitivity", sensitivity, sensitivity_count) }?;
-                let done = handle.instance.$method(unknowns, knowns, seed, result)?;
-                Ok(done_or_discarded(handle, stringify!($name), done))
+                Ok(match handle.instance.$method(unknowns, knowns, seed, result)? {
+                    Ok(()) => Status::OK,
+                    Err(why) => {
+                        handle.logger.discarded(&format!("{}: {why}", stringify!($name)));
+                        Status::DISCARD
+                    }
+                })
             };
             // SAFETY: the caller's contract for instances.
             unsafe { guarded(instance, stringify!($name), body) }

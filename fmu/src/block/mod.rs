@@ -5,8 +5,6 @@ mod disturbance;
 mod filter;
 mod plant;
 
-use punctual_core::jet::Tangent;
-
 use crate::LoopState;
 use crate::configuration::{Configuration, ConfigurationError};
 use crate::product::Product;
@@ -133,24 +131,6 @@ pub trait Block: Send {
     ///
     /// The state of another product; nothing has changed.
     fn restore(&mut self, state: &BlockState) -> Result<(), String>;
-
-    /// The continuous states, where somebody else may integrate them; else none.
-    fn states(&self) -> &[f64] {
-        &[]
-    }
-
-    /// Takes over continuous states, as many as there are.
-    fn set_states(&mut self, _x: &[f64]) {}
-
-    /// The rates of the continuous states per second under the inputs in `values`, with their change along `direction`,
-    /// which is indexed by variables: a state has the place of its output. Nothing is remembered.
-    fn rates(&mut self, _values: &Values, _direction: &[f64]) -> &[Tangent<f64>] {
-        &[]
-    }
-
-    /// Writes to `derivative` the change along `direction` of the outputs that follow from the continuous states, both
-    /// indexed as in [`Self::rates`].
-    fn differentiate_by_states(&mut self, _t: f64, _direction: &[f64], _derivative: &mut [f64]) {}
 
     /// Whether outputs depend on inputs without a step between.
     fn direct_feedthrough(&self) -> bool;

@@ -1,7 +1,6 @@
 //! A plant: holds its state and integrates it under held inputs.
 
 use punctual_core::dynamics::DynPlant;
-use punctual_core::jet::Tangent;
 use punctual_models::Functions;
 
 use super::disturbance::Disturbance;
@@ -28,18 +27,12 @@ pub(super) struct PlantBlock {
     next: Vec<f64>,
     /// Scratch: the inputs with their disturbance.
     u: Vec<f64>,
-    /// Scratch: states, inputs and rates, with their change along a direction.
-    moving: [Vec<Tangent<f64>>; 3],
-    /// The outputs beside the states, with their change along a direction.
-    outputs_moving: Option<Functions<Tangent<f64>>>,
 }
 
 impl PlantBlock {
     pub(super) fn new(configuration: PlantConfiguration, layout: Layout) -> Result<Self, ConfigurationError> {
         let (parameters, plant) = (configuration.parameters(), configuration.build()?);
-        let (outputs, outputs_moving) = (configuration.outputs()?, configuration.outputs()?);
-        let still = |count| vec![Tangent { value: 0.0, directional: 0.0 }; count];
-        let moving = [still(layout.states), still(layout.inputs), still(layout.states)];
+        let outputs = configuration.outputs()?;
         let (x, u) = (vec![0.0; layout.states], vec![0.0; layout.inputs]);
         let disturbance = Disturbance::new(&configuration);
         let seed = parameters.iter().position(|parameter| parameter.tunable);
@@ -54,8 +47,6 @@ impl PlantBlock {
             outputs,
             disturbance,
             seed,
-            moving,
-            outputs_moving,
         })
     }
 
@@ -124,7 +115,6 @@ impl Block for PlantBlock {
         let configuration = updated(&self.configuration, &self.parameters, numbers)?;
         self.plant = configuration.build()?;
         self.outputs = configuration.outputs()?;
-        self.outputs_moving = configuration.outputs()?;
         self.disturbance = Disturbance::new(&configuration);
         self.configuration = configuration;
         // The first parameters are the initial state.
@@ -203,8 +193,6 @@ impl Block for PlantBlock {
             seed: _,
             next: _,
             u: _,
-            moving: _,
-            outputs_moving: _,
         } = self;
         match state {
             BlockState::Plant { x } => x.clone_from(now),
@@ -221,40 +209,6 @@ impl Block for PlantBlock {
         }
         self.x.copy_from_slice(x);
         Ok(())
-    }
-
-    fn states(&self) -> &[f64] {
-        &self.x
-    }
-
-    fn set_states(&mut self, x: &[f64]) {
-        self.x.copy_from_slice(x);
-    }
-
-    fn rates(&mut self, values: &Values, direction: &[f64]) -> &[Tangent<f64>] {
-        let [x, u, rates] = &mut self.moving;
-        for (i, x) in x.iter_mut().enumerate() {
-            *x = Tangent { value: self.x[i], directional: direction[self.layout.outputs + i] };
-        }
-        for (i, u) in u.iter_mut().enumerate() {
-            *u = Tangent { value: values.reals[i], directional: direction[i] };
-        }
-        // The lengths are those of the plant by construction, since the table was built from it.
-        let done = self.plant.rates(x, u, rates);
-        debug_assert!(done.is_ok(), "{done:?}");
-        rates
-    }
-
-    fn differentiate_by_states(&mut self, t: f64, direction: &[f64], derivative: &mut [f64]) {
-        let first = self.layout.outputs;
-        let others = first + self.layout.states;
-        derivative[first..others].copy_from_slice(&direction[first..others]);
-        if let Some(outputs) = &mut self.outputs_moving {
-            let x = &self.x;
-            let moving = |i: usize| Tangent { value: x[i], directional: direction[first + i] };
-            let slots = derivative[others..].iter_mut();
-            slots.zip(outputs.at(t, moving)).for_each(|(slot, y)| *slot = y.directional);
-        }
     }
 
     fn direct_feedthrough(&self) -> bool {

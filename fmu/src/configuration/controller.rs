@@ -426,7 +426,6 @@ impl ControllerConfiguration {
         }
         // Check every number against its range.
         configuration.experiment.check()?;
-        configuration.experiment.check_exchange(Some(super::STEPPED))?;
         // The start values of inputs are not parameters.
         if let Some([x, y]) = raw.goal {
             Range::FINITE.check("goal[1]", x)?;

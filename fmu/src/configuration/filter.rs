@@ -424,7 +424,6 @@ impl FilterConfiguration {
         check_known("measurement_errors", &configuration.measurement_errors, "measured state", &states)?;
         // Check every number by itself.
         configuration.experiment.check()?;
-        configuration.experiment.check_exchange(Some(super::STEPPED))?;
         for parameter in configuration.parameters() {
             parameter.check(&mut configuration)?;
         }

@@ -173,33 +173,15 @@ impl Configuration {
     /// The same configuration for another version of FMI, with arrays or without.
     #[must_use]
     pub fn for_fmi(mut self, fmi: FmiVersion, arrays: bool) -> Self {
-        let experiment = self.experiment_mut();
+        let experiment = match &mut self {
+            Self::Filter(c) => &mut c.experiment,
+            Self::Plant(c) => &mut c.experiment,
+            Self::Controller(c) => &mut c.experiment,
+        };
         experiment.fmi = fmi;
         // FMI 2.0 has none to do without.
         experiment.arrays = arrays || fmi == FmiVersion::Two;
         self
-    }
-
-    /// The same configuration with model exchange beside co-simulation.
-    ///
-    /// # Errors
-    ///
-    /// An FMU that has to be stepped: a filter, a controller, a plant with a disturbance.
-    pub fn with_model_exchange(mut self) -> Result<Self, ConfigurationError> {
-        self.experiment_mut().model_exchange = true;
-        match &self {
-            Self::Plant(c) => c.check_exchange(),
-            Self::Filter(_) | Self::Controller(_) => self.experiment().check_exchange(Some(STEPPED)),
-        }?;
-        Ok(self)
-    }
-
-    fn experiment_mut(&mut self) -> &mut ExperimentSection {
-        match self {
-            Self::Filter(c) => &mut c.experiment,
-            Self::Plant(c) => &mut c.experiment,
-            Self::Controller(c) => &mut c.experiment,
-        }
     }
 }
 
@@ -223,7 +205,7 @@ pub static SECTIONS: [&Section; 12] = [
 static EXPERIMENT: Section = Section {
     name: "experiment",
     keys: || {
-        static KEYS: [Key; 6] = [
+        static KEYS: [Key; 5] = [
             Key::new("start_time", Value::Number(Unit::Is("s"), Range::FINITE), Some("0"), "when it begins"),
             Key::new("stop_time", Value::Number(Unit::Is("s"), Range::FINITE), Some("10"), "after the start"),
             Key::new("step_size", STEP_SIZE, Some("0.001"), "the communication step"),
@@ -233,13 +215,6 @@ static EXPERIMENT: Section = Section {
                 Value::Flag,
                 Some("`true`"),
                 "with `fmi = 3`: whether signals that belong together are [one array](fmu.md#fmi-30)",
-            ),
-            Key::new(
-                "model_exchange",
-                Value::Flag,
-                Some("`false`"),
-                "whether a plant must have [model exchange](fmu.md#model-exchange); with `fmi = 3` each that can has it \
-                 anyway",
             ),
         ];
         KEYS.iter().collect()
@@ -264,22 +239,11 @@ pub struct ExperimentSection {
     /// Whether signals that belong together are one array, which FMI 3.0 alone has. Default: true.
     #[serde(skip_serializing_if = "is_true")]
     pub arrays: bool,
-    /// Whether a plant must have model exchange beside co-simulation. Default: false. With FMI 3.0 each plant that can has
-    /// it anyway.
-    #[serde(skip_serializing_if = "is_default")]
-    pub model_exchange: bool,
 }
 
 impl Default for ExperimentSection {
     fn default() -> Self {
-        Self {
-            start_time: 0.0,
-            stop_time: 10.0,
-            step_size: 0.001,
-            fmi: FmiVersion::Two,
-            arrays: true,
-            model_exchange: false,
-        }
+        Self { start_time: 0.0, stop_time: 10.0, step_size: 0.001, fmi: FmiVersion::Two, arrays: true }
     }
 }
 
@@ -334,21 +298,7 @@ impl From<FmiVersion> for u64 {
     }
 }
 
-/// Why an FMU that is no plant has no model exchange.
-const STEPPED: &str = "which plants alone have; a filter and a controller are stepped";
-
 impl ExperimentSection {
-    /// Refuses model exchange that is asked for where something is in its way.
-    fn check_exchange(&self, obstacle: Option<&str>) -> Result<(), ConfigurationError> {
-        match obstacle.filter(|_| self.model_exchange) {
-            Some(why) => Err(ConfigurationError::new(
-                "experiment.model_exchange",
-                format!("is true, must be false: there is no model exchange here, {why}"),
-            )),
-            None => Ok(()),
-        }
-    }
-
     fn check(&self) -> Result<(), ConfigurationError> {
         Range::FINITE.check("experiment.start_time", self.start_time)?;
         Range::FINITE.check("experiment.stop_time", self.stop_time)?;

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use punctual_core::dynamics::DynPlant;
-use punctual_core::scalar::Scalar;
 use punctual_models::Functions;
 use serde::{Deserialize, Serialize};
 
@@ -16,8 +15,8 @@ use super::model::RawModel;
 use super::names::{check_identifier, check_known, taken};
 use super::unit::measured;
 use super::{
-    ConfigurationError, EXPERIMENT, ExperimentSection, FmiVersion, ModelName, Parameter, PlantSection,
-    PluginLoader, Range, VariableSection, check_unit, model,
+    ConfigurationError, EXPERIMENT, ExperimentSection, ModelName, Parameter, PlantSection, PluginLoader,
+    Range, VariableSection, check_unit, model,
 };
 
 const INNER_STEP: Range = Range::POSITIVE;
@@ -269,7 +268,6 @@ impl PlantConfiguration {
             x0.entry(state.name).or_insert(start);
         }
         experiment.check()?;
-        self.check_exchange()?;
         for parameter in self.parameters() {
             parameter.check(&mut self)?;
         }
@@ -352,7 +350,7 @@ impl PlantConfiguration {
             }
             check_unit(&field("unit"), &output.unit)?;
         }
-        self.outputs::<f64>()?;
+        self.outputs()?;
         for (i, OutputSection { expression, unit, .. }) in self.output.iter().enumerate() {
             let refuse = |key: &str, message: String| {
                 Err(ConfigurationError::new(format!("output[{i}].{key}"), message))
@@ -366,18 +364,6 @@ impl PlantConfiguration {
             }
         }
         Ok(())
-    }
-
-    /// Whether an importer may integrate the plant itself. One with a disturbance has to be stepped: that is held for a
-    /// period, and the states measured are not those that move. With FMI 2.0 it has to be asked for.
-    pub fn can_be_integrated(&self) -> bool {
-        let ExperimentSection { fmi, model_exchange, .. } = self.experiment;
-        self.disturbance.is_none() && (fmi == FmiVersion::Three || model_exchange)
-    }
-
-    pub(super) fn check_exchange(&self) -> Result<(), ConfigurationError> {
-        let noisy = "since a plant with `[disturbance]` has to be stepped; leave one of the two out";
-        self.experiment.check_exchange(self.disturbance.is_some().then_some(noisy))
     }
 
     /// The outputs as signals, in order.
@@ -397,7 +383,7 @@ impl PlantConfiguration {
     /// # Errors
     ///
     /// An expression that cannot be used, by its path.
-    pub fn outputs<C: Scalar>(&self) -> Result<Option<Functions<C>>, ConfigurationError> {
+    pub fn outputs(&self) -> Result<Option<Functions<f64>>, ConfigurationError> {
         if self.output.is_empty() {
             return Ok(None);
         }

@@ -286,7 +286,7 @@ fn unknown_and_missing_keys_and_wrong_types() {
             FILTER,
             "[[barrier]]",
             "[experiment]\nwhen = 1.0\n[[barrier]]",
-            "experiment.when: is no key here; the keys are start_time, stop_time, step_size, fmi, arrays, model_exchange (line 6)",
+            "experiment.when: is no key here; the keys are start_time, stop_time, step_size, fmi, arrays (line 6)",
         ),
         (FILTER, "radius = 2.0", "", "barrier[0].radius: missing, disc needs it"),
         (FILTER, "name = \"goal\"", "", "barrier[0].name: missing, it must be given (line 5)"),

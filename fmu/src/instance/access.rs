@@ -51,9 +51,6 @@ impl Instance {
             Ok(Variable { name, causality: Causality::Parameter, .. }) => {
                 format!("{name} is a fixed parameter and cannot change after initialization")
             }
-            Ok(Variable { name, causality: Causality::Local, .. }) => {
-                format!("{name} is computed and cannot be set")
-            }
             Ok(Variable { name, .. }) => format!("{name} is an output and cannot be set"),
         }
     }

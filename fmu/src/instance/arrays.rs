@@ -42,27 +42,12 @@ impl Instance {
             let (to, others) = rest.split_at_mut(self.accesses[first].length as usize);
             match self.values.reals.get(first..first + to.len()) {
                 Some(values) => to.copy_from_slice(values),
-                None => self.beyond_the_table(first, to),
+                // What FMI 2.0 does not have: the time.
+                None => to.fill(self.time),
             }
             rest = others;
         }
         Ok(())
-    }
-
-    /// Reads a variable that FMI 2.0 does not have: the time, or rates of the states.
-    fn beyond_the_table(&mut self, first: usize, out: &mut [f64]) {
-        match (first - self.product.variables.len()).checked_sub(1) {
-            None => out.fill(self.time),
-            Some(first) => {
-                self.rates()[first..].iter().zip(out).for_each(|(rate, o)| *o = rate.value);
-            }
-        }
-    }
-
-    /// Whether a variable is, or holds, states that the importer may integrate.
-    fn is_state(&self, reference: u32) -> bool {
-        let first = self.product.layout.outputs;
-        (first..first + self.product.layout.rates).contains(&(reference as usize))
     }
 
     /// Reads Int32 variables.
@@ -111,16 +96,10 @@ impl Instance {
     /// As there; another number of values than the variables have.
     pub fn set_float64(&mut self, references: &[u32], values: &[f64]) -> Result<(), Failure> {
         self.check_runs(Call::Set, ScalarType::Real, references, values.len())?;
-        let states = self.mode == Mode::CONTINUOUS && references.iter().any(|&r| self.is_state(r));
-        if states || references.iter().any(|&reference| reference as usize >= self.product.layout.parameters)
-        {
+        if references.iter().any(|&reference| reference as usize >= self.product.layout.parameters) {
             for (i, &value) in scalars(&self.accesses, references).zip(values) {
                 self.check_range(i, value)?;
             }
-        }
-        if states {
-            // Those that are not set are in the values too, once they have been computed.
-            self.refresh();
         }
         let mut rest = values;
         for &reference in references {
@@ -128,10 +107,6 @@ impl Instance {
             let (from, others) = rest.split_at(self.accesses[first].length as usize);
             self.values.reals[first..first + from.len()].copy_from_slice(from);
             rest = others;
-        }
-        if states {
-            let first = self.product.layout.outputs;
-            self.block.set_states(&self.values.reals[first..first + self.product.layout.rates]);
         }
         self.taken_over(references);
         Ok(())
@@ -174,24 +149,19 @@ impl Instance {
     ///
     /// # Errors
     ///
-    /// A reference that is none of an output or of rates.
+    /// A reference that is none of an output.
     pub fn dependencies(
         &self,
         dependent: u32,
     ) -> Result<impl Iterator<Item = (usize, u32, usize)> + '_, Failure> {
         let item = self.item(dependent)?;
-        if item.scalars.start > self.product.variables.len() {
-            // Each rate may depend on every state and input: an index of 0 stands for all elements.
-            let all = self.product.inputs_and_states().map(|on| (0, on.reference(), 0));
-            return Ok(Either::Rates(all));
-        }
         let initial = self.mode.is_in(Mode::INSTANTIATED.or(Mode::INITIALIZATION));
         let variables = self.product.variables.get(item.scalars.clone());
         let outputs = variables.filter(|v| v.iter().all(|v| v.causality == Causality::Output));
         let Some(outputs) = outputs else {
             return Err(format!("{} is no output, so that its dependencies are not told", item.name));
         };
-        Ok(Either::Outputs(outputs.iter().enumerate().flat_map(move |(k, output)| {
+        Ok(outputs.iter().enumerate().flat_map(move |(k, output)| {
             let told =
                 output.initial_dependencies.as_ref().filter(|_| initial).or(output.dependencies.as_ref());
             let told = told.map_or(&[][..], Vec::as_slice);
@@ -200,7 +170,7 @@ impl Instance {
                 let element = on_item.element(on as usize);
                 (item.element(item.scalars.start + k), on_item.reference(), element)
             })
-        })))
+        }))
     }
 
     /// Reads or writes a type that no variable has, so that every reference is an error.
@@ -235,12 +205,11 @@ impl Instance {
         let (set, running) = (call == Call::Set, self.is_running());
         let mut total = 0;
         for &reference in references {
-            let state = self.mode == Mode::CONTINUOUS && self.is_state(reference);
             let fits = |access: &&Access| {
                 let settable = match access.causality {
                     Causality::Input => true,
                     Causality::Parameter => !running || access.variability == Variability::Tunable,
-                    _ => state,
+                    _ => false,
                 };
                 access.length > 0 && access.scalar == scalar && (!set || settable)
             };
@@ -287,23 +256,6 @@ impl Instance {
                 format!("{name} is a fixed parameter and cannot change after initialization")
             }
             causality => format!("{name} is of causality {} and cannot be set", causality.as_str()),
-        }
-    }
-}
-
-/// Either of two iterators.
-enum Either<A, B> {
-    Outputs(A),
-    Rates(B),
-}
-
-impl<T, A: Iterator<Item = T>, B: Iterator<Item = T>> Iterator for Either<A, B> {
-    type Item = T;
-
-    fn next(&mut self) -> Option<T> {
-        match self {
-            Self::Outputs(outputs) => outputs.next(),
-            Self::Rates(rates) => rates.next(),
         }
     }
 }

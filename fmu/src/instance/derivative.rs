@@ -27,9 +27,6 @@ impl Instance {
         self.check(Call::GetDirectionalDerivative)?;
         for (references, side) in [unknowns, knowns].into_iter().zip(SIDES) {
             for &reference in references {
-                if self.is_beside(reference, side.0) {
-                    continue;
-                }
                 let Variable { name, causality, .. } = self.variable(BaseType::Real, reference)?;
                 check_side(name, *causality, side)?;
             }
@@ -115,10 +112,6 @@ impl Instance {
     fn check_sides(&self, sides: [&[u32]; 2], lengths: [usize; 2], names: [&str; 2]) -> Result<(), Failure> {
         for (references, side) in sides.into_iter().zip(SIDES) {
             for &reference in references {
-                let access = self.accesses.get(reference as usize);
-                if access.is_some_and(|access| access.length > 0) && self.is_beside(reference, side.0) {
-                    continue;
-                }
                 let item = self.item(reference)?;
                 let access = self.accesses[item.scalars.start];
                 if access.scalar != ScalarType::Real {
@@ -140,30 +133,11 @@ impl Instance {
         Ok(())
     }
 
-    /// Whether a variable stands on a side of the Jacobian beside inputs and outputs: rates among the unknowns; among the
-    /// knowns states, and in initialization the parameters that they begin with.
-    fn is_beside(&self, reference: u32, side: Causality) -> bool {
-        let layout = &self.product.layout;
-        let within = |first: usize| (first..first + layout.rates).contains(&(reference as usize));
-        match side {
-            Causality::Output => within(self.product.first_rate()),
-            _ => within(layout.outputs) || self.mode == Mode::INITIALIZATION && within(layout.parameters),
-        }
-    }
-
     /// Checks that each number of a seed of the variables `indices` is finite.
     fn check_seed(&self, mut indices: impl Iterator<Item = usize>, seed: &[f64]) -> Result<(), Failure> {
         let Some(i) = seed.iter().position(|v| !v.is_finite()) else { return Ok(()) };
-        let name = indices.nth(i).map_or("", |index| self.scalar_name(index));
+        let name = indices.nth(i).map_or("", |index| &self.product.variables[index].name);
         Err(format!("the seed of {name} is {}, must be finite", seed[i]))
-    }
-
-    /// The name of the scalar `index`; of one beyond the table that of its variable.
-    fn scalar_name(&self, index: usize) -> &str {
-        match self.product.variables.get(index) {
-            Some(variable) => &variable.name,
-            None => &self.product.item_of(index).name,
-        }
     }
 
     /// Differentiates along the direction that is there.
@@ -171,25 +145,11 @@ impl Instance {
         if !self.configured {
             self.configure().map_err(|e| e.to_string())?;
         }
-        let layout = self.product.layout;
-        let first_rate = self.product.first_rate();
         let [direction, derivative, _] = &mut self.derivative;
         derivative.fill(0.0);
         // After initialization outputs without direct feedthrough change in steps only.
         if self.mode == Mode::INITIALIZATION || self.block.direct_feedthrough() {
             self.block.differentiate(self.time, &self.values, direction, derivative)?;
-        }
-        if layout.rates > 0 {
-            if self.mode == Mode::INITIALIZATION {
-                // A state begins with its parameter.
-                for i in 0..layout.rates {
-                    direction[layout.outputs + i] += direction[layout.parameters + i];
-                }
-            }
-            self.block.differentiate_by_states(self.time, direction, derivative);
-            let rates = self.block.rates(&self.values, direction);
-            let slots = derivative[first_rate..].iter_mut();
-            slots.zip(rates).for_each(|(slot, rate)| *slot = rate.directional);
         }
         Ok(())
     }
@@ -199,7 +159,7 @@ impl Instance {
         match indices.find(|&i| !self.derivative[1][i].is_finite()) {
             None => Ok(()),
             Some(i) => {
-                let (name, value) = (self.scalar_name(i), self.derivative[1][i]);
+                let (name, value) = (&self.product.variables[i].name, self.derivative[1][i]);
                 Err(format!("the derivative of {name} is {value}, must be finite"))
             }
         }

@@ -1,8 +1,7 @@
 //! The variables of FMI 3.0: single ones of the table, and runs of it as arrays.
 //!
 //! The value reference of an array is the index of its first scalar, so that a read or write is a run over the
-//! same values. After the table come variables that FMI 2.0 does not have: the time, and for plants the derivatives
-//! of the states.
+//! same values. After the table comes what FMI 2.0 does not have: the time.
 
 use std::ops::Range;
 
@@ -15,7 +14,7 @@ use super::Layout;
 pub struct Item {
     /// Its name: that of the scalar, or what the names of the scalars have in common.
     pub name: String,
-    /// The scalars, by their index; those after the table are not in it.
+    /// The scalars, by their index; the time comes after the table.
     pub scalars: Range<usize>,
     /// The lengths of the array, the last one running fastest; none for a scalar.
     pub dimensions: Vec<usize>,
@@ -97,10 +96,8 @@ fn array_at(variables: &[Variable], first: usize, inputs: usize) -> Option<Item>
     whole.then(|| Item { name: name.to_owned(), scalars: first..first + length, dimensions })
 }
 
-/// The variables of FMI 3.0 over the table `variables`, with arrays or without; then the time, and the derivatives
-/// of the states that can be integrated.
+/// The variables of FMI 3.0 over the table `variables`, with arrays or without; then the time.
 pub(super) fn items(variables: &[Variable], layout: &Layout, arrays: bool) -> Vec<Item> {
-    let rates = layout.rates;
     let mut items = Vec::new();
     let mut next = 0;
     while next < variables.len() {
@@ -112,17 +109,6 @@ pub(super) fn items(variables: &[Variable], layout: &Layout, arrays: bool) -> Ve
         items.push(item);
     }
     items.push(Item::scalar(TIME, next));
-    next += 1;
-    if rates > 0 {
-        let states = &variables[layout.outputs..][..rates];
-        if arrays {
-            let (name, scalars) = ("der(x)".to_owned(), next..next + rates);
-            items.push(Item { name, scalars, dimensions: vec![rates] });
-        } else {
-            let of = |(i, state): (usize, &Variable)| Item::scalar(&format!("der({})", state.name), next + i);
-            items.extend(states.iter().enumerate().map(of));
-        }
-    }
     items
 }
 
@@ -139,7 +125,7 @@ pub(crate) fn accesses(variables: &[Variable], items: &[Item]) -> Vec<Access> {
             },
             None => Access {
                 scalar: ScalarType::Real,
-                causality: if index == variables.len() { Causality::Independent } else { Causality::Local },
+                causality: Causality::Independent,
                 variability: Variability::Continuous,
                 length: 0,
             },

@@ -1,15 +1,14 @@
 //! The model description of FMI 3.0, from that of FMI 2.0 and the arrays.
 
 use punctual_modeldescription::fmi3::{
-    CoSimulation, Dimension, EnumerationItem, Float, Integer, Interface, ModelDescription, ModelExchange,
-    ModelStructure, Plain, Terminal, TerminalMember, Terminals, TypeDefinition, Unknown, Variable,
-    VariableKind,
+    CoSimulation, Dimension, EnumerationItem, Float, Integer, Interface, ModelDescription, ModelStructure,
+    Plain, Terminal, TerminalMember, Terminals, TypeDefinition, Unknown, Variable, VariableKind,
 };
 use punctual_modeldescription::{self as fmi2, Causality, Variability};
 
 use super::Product;
 use super::arrays::{Item, TIME};
-use crate::configuration::{Configuration, over_seconds};
+use crate::configuration::Configuration;
 
 impl Product {
     /// The model description of an FMU of FMI 3.0.
@@ -29,9 +28,6 @@ impl Product {
         for unknown in &mut structure.outputs {
             self.depend(unknown, |output| output.dependencies.as_ref());
         }
-        for rate in &mut structure.derivatives {
-            rate.dependencies = Some(self.inputs_and_states().map(Item::reference).collect());
-        }
         for unknown in &mut structure.initial_unknowns {
             self.depend(unknown, |output| {
                 output.initial_dependencies.as_ref().or(output.dependencies.as_ref())
@@ -46,8 +42,6 @@ impl Product {
             license: of_fmi2.license,
             generation_tool: of_fmi2.generation_tool,
             variable_naming_convention: of_fmi2.variable_naming_convention,
-            model_exchange: (self.layout.rates > 0)
-                .then(|| ModelExchange { interface: interface.clone(), ..ModelExchange::default() }),
             co_simulation: Some(CoSimulation {
                 interface,
                 can_handle_variable_step: true,
@@ -105,20 +99,8 @@ impl Product {
         unknown.dependencies = Some(references);
     }
 
-    /// The variables that the rates of the states depend on.
-    pub(crate) fn inputs_and_states(&self) -> impl Iterator<Item = &Item> {
-        let end = self.layout.outputs + self.layout.rates;
-        self.items.iter().filter(move |item| item.scalars.end <= end)
-    }
-
     fn variable_of(&self, item: &Item) -> Variable {
-        let Some(scalars) = self.variables.get(item.scalars.clone()) else {
-            let after = item.scalars.start - self.variables.len();
-            return match after.checked_sub(1) {
-                None => time(item.reference()),
-                Some(first) => self.rate(item, self.layout.outputs + first),
-            };
-        };
+        let Some(scalars) = self.variables.get(item.scalars.clone()) else { return time(item.reference()) };
         let first = &scalars[0];
         let (causality, variability) = (first.causality, first.variability);
         let mut variable =
@@ -129,25 +111,6 @@ impl Product {
             variable.declared_type.clone_from(&of.declared_type);
         }
         variable
-    }
-}
-
-impl Product {
-    /// The rate of the states from number `first` of the table on.
-    fn rate(&self, item: &Item, first: usize) -> Variable {
-        let states = &self.variables[first..first + item.scalars.len()];
-        let unit = common(states.iter().map(|v| Some(over_seconds(v.kind.unit().unwrap_or("1"), 1))));
-        let kind = VariableKind::Float64(Float {
-            unit,
-            derivative: Some(self.item_of(first).reference()),
-            ..Float::default()
-        });
-        let (local, continuous) = (Causality::Local, Variability::Continuous);
-        let mut rate = Variable::new(&*item.name, item.reference(), local, continuous, kind);
-        let of = |v: &fmi2::Variable| v.name.clone();
-        rate.description = format!("rate of {}", states.iter().map(of).collect::<Vec<_>>().join(", "));
-        rate.dimensions = item.dimensions.iter().map(|length| Dimension::fixed(*length as u64)).collect();
-        rate
     }
 }
 

@@ -350,8 +350,6 @@ fn descriptions_of_fmi3() {
         let mut table = new.variables.clone();
         for (own, other) in table.iter_mut().zip(&old.variables) {
             if matches!(new.configuration, Configuration::Plant(_)) {
-                // Who integrates the states knows them.
-                own.dependencies.clone_from(&other.dependencies);
                 own.initial_dependencies.clone_from(&other.initial_dependencies);
             }
         }
@@ -381,9 +379,7 @@ fn descriptions_of_fmi3() {
                 assert_eq!(float.start, starts, "{name}: {}", item.name);
             }
         }
-        assert_eq!(next, new.variables.len() + 1 + new.layout.rates, "{name}");
-        assert_eq!(description.model_exchange.is_some(), new.layout.rates > 0, "{name}");
-        assert_eq!(description.structure.derivatives.is_empty(), new.layout.rates == 0, "{name}");
+        assert_eq!(next, new.variables.len() + 1, "{name}");
     }
 }
 
@@ -399,8 +395,6 @@ fn units_and_ranges_that_all_elements_share() {
     };
     let x0 = of("x0");
     assert_eq!((x0.unit.as_deref(), x0.min, x0.max), (Some("m"), Some(0.0), None));
-    let rates = of("der(x)");
-    assert_eq!((rates.unit.as_deref(), rates.derivative), (Some("m/s"), Some(1)));
     assert_eq!(description.by_name("x").unwrap().description, "a in m: a; b in m: b");
     assert_eq!(of("u").unit.as_deref(), Some("m/s"));
 }
@@ -411,58 +405,16 @@ const TANK: &str = "kind = \"plant\"\noutput = [{ name = \"twice\", expression =
                     inputs = [{ name = \"u\", unit = \"m/s\" }]\nparameters = [{ name = \"w\", unit = \"1/s\", start = 2.0 }]\nderivatives = { a = \"u\", b = \"-w*b\" }\n";
 
 #[test]
-fn model_exchange_of_fmi2_is_asked_for() {
-    let without = product(TANK);
-    let with = without.configuration.clone().with_model_exchange().unwrap();
-    assert_eq!(with, Configuration::parse(&with.canonical().unwrap()).unwrap());
-    let with = Product::new(with).unwrap();
-    assert_ne!(with.guid, without.guid);
-    assert!(!without.model_description().to_xml().unwrap().contains("ModelExchange"));
-    // The rates come last, so that all other variables keep their value references.
-    let names = |product: &Product| product.variables.iter().map(|v| v.name.clone()).collect::<Vec<_>>();
-    let wanted = [names(&without), vec!["der(x.a)".to_owned(), "der(x.b)".to_owned()]].concat();
-    assert_eq!((names(&with), with.first_rate()), (wanted, without.variables.len()));
-    let description = with.model_description();
-    let rate = description.variables.last().unwrap();
-    assert_eq!((rate.kind.unit(), rate.state()), (Some("rad/s2"), Some(3)));
-    let structure = description.structure().unwrap();
-    let listed: Vec<_> = structure.derivatives.iter().map(|u| (u.index, u.dependencies.clone())).collect();
-    let on_all = Some(vec![1, 2, 3]);
-    assert_eq!(listed, [(9, on_all.clone()), (10, on_all)], "on the input and the states");
-    let outputs: Vec<_> = structure.outputs.iter().map(|u| u.dependencies.clone().unwrap()).collect();
-    assert_eq!(outputs, [vec![2], vec![3], vec![2, 3]], "the states on themselves, the output on them");
-    description.to_xml().unwrap();
-    let three = with.configuration.clone().for_fmi(FmiVersion::Three, true);
-    let three = Product::new(three).unwrap().model_description_of_fmi3();
-    assert!(three.model_exchange.is_some());
-    let first = &three.structure.initial_unknowns[1];
+fn an_output_of_a_plant_depends_on_states_and_constants_at_the_start() {
+    let three = product(TANK).configuration.for_fmi(FmiVersion::Three, true);
+    let structure = Product::new(three).unwrap().model_description_of_fmi3().structure;
+    let first = &structure.initial_unknowns[1];
     assert_eq!(
         (first.value_reference, &first.dependencies),
         (3, &Some(vec![4, 6, 7])),
         "on x0, w, inner_step"
     );
-    // Whatever has to be stepped says so.
-    let asked = "experiment.model_exchange = true\n";
-    let noisy = format!(
-        "{}\n[disturbance]\ninputs = {{ u = 0.1 }}\n",
-        TANK.replace("[plant]", &format!("{asked}[plant]"))
-    );
-    let filter = format!("kind = \"filter\"\nplant.model = \"unicycle\"\n{asked}{BARRIER}");
-    let controller =
-        format!("kind = \"controller\"\ncontroller = \"damping\"\nplant.model = \"point_mass\"\n{asked}");
-    for (text, why) in [
-        (noisy, "since a plant with `[disturbance]` has to be stepped; leave one of the two out"),
-        (filter, "which plants alone have; a filter and a controller are stepped"),
-        (controller, "which plants alone have; a filter and a controller are stepped"),
-    ] {
-        let error = Configuration::parse(&text).unwrap_err().to_string();
-        let wanted = format!(
-            "experiment.model_exchange: is true, must be false: there is no model exchange here, {why}"
-        );
-        assert!(error.contains(&wanted), "{error}");
-        let plain = Configuration::parse(&text.replace(asked, "")).unwrap();
-        assert_eq!(plain.with_model_exchange().unwrap_err().to_string(), wanted);
-    }
+    assert_eq!(structure.outputs[1].dependencies, Some(Vec::new()), "and then on nothing until a step");
 }
 
 #[test]

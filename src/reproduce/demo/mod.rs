@@ -119,7 +119,6 @@ fn build(folder: &Path, stem: &str, text: &str, library: Option<&Path>) -> Resul
         configuration,
         library.map(Path::to_owned).as_slice(),
         &folder.join(format!("{stem}.fmu")),
-        false,
     )?;
     Ok(())
 }

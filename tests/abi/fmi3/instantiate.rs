@@ -58,18 +58,14 @@ fn a_path_may_end_in_a_separator() {
 
 #[test]
 fn the_other_interfaces_are_refused() {
-    let fmu = Fmu::of_fmi3(FILTER, true);
+    let fmu = Fmu::of_fmi3(PLANT, true);
     let Said { token, path, .. } = Said::of(&fmu);
     let (token, path) = (token.unwrap(), path.unwrap());
     let to = Log::default();
     let (name, token, path, environment) = (c"a".as_ptr(), token.as_ptr(), path.as_ptr(), to.environment());
     let exchange = (API.instantiate_model_exchange)(name, token, path, 0, 0, environment, Some(log));
     assert!(exchange.is_null());
-    assert!(
-        to.failure().starts_with(
-            "fmi3InstantiateModelExchange: the FMU has no model exchange, which plants alone have"
-        )
-    );
+    assert_eq!(to.failure(), "fmi3InstantiateModelExchange: the FMU has no model exchange");
     let scheduled = (API.instantiate_scheduled_execution)(
         name,
         token,
@@ -83,9 +79,7 @@ fn the_other_interfaces_are_refused() {
         None,
     );
     assert!(scheduled.is_null());
-    assert!(
-        to.failure().starts_with("fmi3InstantiateScheduledExecution: the FMU has no scheduled execution")
-    );
+    assert_eq!(to.failure(), "fmi3InstantiateScheduledExecution: the FMU has no scheduled execution");
 }
 
 /// A function of the other version is refused, and the instance goes on.

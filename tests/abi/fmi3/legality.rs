@@ -3,7 +3,6 @@
 use std::ffi::c_int;
 use std::ptr::{null, null_mut};
 
-use punctual_fmu::configuration::FmiVersion;
 use punctual_fmu::fmi3;
 use punctual_fmu::instance::{Call, Mode};
 
@@ -281,7 +280,7 @@ fn every_function_in_every_mode() {
         let fresh = finish(&Slave::new(&fmu), Mode::INSTANTIATED);
         for mode in [Mode::INSTANTIATED, Mode::INITIALIZATION, Mode::STEP, Mode::TERMINATED] {
             for (name, call, function, answer) in &functions {
-                let modes = call.map_or(Mode::ANY, |call| call.modes(FmiVersion::Three));
+                let modes = call.map_or(Mode::ANY, Call::modes);
                 let slave = into_mode(&fmu, mode);
                 let found = function(&slave);
                 let place = format!("{name} in {}: {:?}", mode.name(), slave.log.entries());

@@ -9,13 +9,11 @@
 //! | `sameness` | that whole runs have the bits of FMI 2.0, by arrays and by scalars |
 //! | `states` | snapshots: rollback, bytes, refusals |
 //! | `derivatives` | directional and adjoint derivatives against each other and against differences |
-//! | `exchange` | model exchange: bits, modes, refusals, derivatives |
 //! | `dependencies` | what each element of an output depends on |
 
 mod arguments;
 mod dependencies;
 mod derivatives;
-pub(crate) mod exchange;
 mod instantiate;
 mod legality;
 mod sameness;

@@ -1,7 +1,7 @@
 //! Functions of features that the model description excludes. Each names the reason, and answers `fmi3OK` only where
 //! nothing is asked for.
 
-use super::super::fmi3::{Binary, Clock, Instance, IntervalQualifier, Status, Text, ValueReference};
+use super::super::fmi3::{Binary, Boolean, Clock, Instance, IntervalQualifier, Status, Text, ValueReference};
 use super::super::guard::{Handle, guarded, none, slice};
 
 use crate::instance::Call;
@@ -134,6 +134,26 @@ refused! {
         fmi3ActivateModelPartition(_clock: ValueReference, _time: f64);
     }
     "hasEventMode is false" {
+        fmi3EnterEventMode();
+        fmi3UpdateDiscreteStates(
+            _need_update: *mut Boolean, _terminate: *mut Boolean, _nominals_changed: *mut Boolean,
+            _values_changed: *mut Boolean, _next_event_time_defined: *mut Boolean, _next_event_time: *mut f64
+        );
         fmi3EnterStepMode();
+    }
+    "the FMU is one of co-simulation" {
+        fmi3EnterContinuousTimeMode();
+        fmi3CompletedIntegratorStep(
+            _no_set_fmu_state_prior_to_current_point: Boolean, _enter_event_mode: *mut Boolean,
+            _terminate: *mut Boolean
+        );
+        fmi3SetTime(_time: f64);
+        fmi3SetContinuousStates(_states: *const f64, _count: usize);
+        fmi3GetContinuousStateDerivatives(_derivatives: *mut f64, _count: usize);
+        fmi3GetEventIndicators(_indicators: *mut f64, _count: usize);
+        fmi3GetContinuousStates(_states: *mut f64, _count: usize);
+        fmi3GetNominalsOfContinuousStates(_nominals: *mut f64, _count: usize);
+        fmi3GetNumberOfEventIndicators(_count: *mut usize);
+        fmi3GetNumberOfContinuousStates(_count: *mut usize);
     }
 }
