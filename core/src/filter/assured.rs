@@ -38,8 +38,6 @@ const AMPLE: f64 = 2.0;
 /// Parts of the deadlines for which a plan is sought where none is found for the deadlines themselves: it keeps them too. Each
 /// makes a refusal longer by as much as the first search.
 const SHORTER: [f64; 1] = [0.8];
-/// How many times the reserve of a barrier a search has to miss it by for the search without reserve to be left.
-const FAR_OFF: f64 = 10.0;
 /// The most points of a plan's way at which it is looked for its arrival, about.
 const MOST_POINTS: f64 = 4000.0;
 /// How much later than a plan arrives the deadline is that it keeps.
@@ -1343,20 +1341,9 @@ impl AssuredFilter {
         let search =
             |promises: &[Option<Promise>]| self.planned(promises, at, u, |planner| planner.search(at.0, x));
         let mut found = search(&promises);
-        // What is missed by far more than the reserve is missed without it.
-        let is_far = match found {
-            Err(Failure::Broken { barrier, slack, .. }) => promises
-                .get(barrier)
-                .copied()
-                .flatten()
-                .is_some_and(|missed| missed.reserve > 0.0 && -slack > FAR_OFF * missed.reserve),
-            _ => false,
-        };
         if found.is_err() && promises.iter().flatten().any(|promise| promise.reserve > promise.margin) {
             promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);
-            if !is_far {
-                found = search(&promises);
-            }
+            found = search(&promises);
         }
         if let Err(Failure::Broken { .. } | Failure::Unsteady) = found
             && self.horizon.is_none()
