@@ -1,6 +1,6 @@
 //! Cost of the C interface in a step: `cargo bench --bench abi`.
 //!
-//! The same filter, from the same configuration, runs once in process (`SafetyFilter::step`) and through the
+//! The same filter, from the same configuration, runs once in process (`Filter::step`) and through the
 //! shared library as an importer loads it, once by FMI 2.0 and once by FMI 3.0 with arrays. Steps are of about 1 ms on the way to the disc, where the row is
 //! active. After a thousand of them both go back to their first state, which costs a thousandth of it. "doStep
 //! adds" is the difference to the filter in process, measured in turns, so that a busy machine slows both. "instantiate"
@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use api::{API, three};
 use criterion::{Criterion, criterion_group, criterion_main};
 use fmu::Fmu;
-use punctual_core::filter::{FilterState, SafetyFilter};
+use punctual_core::filter::{Filter, FilterState};
 use slave::Slave;
 use support::{SAFE, T, X};
 
@@ -60,7 +60,7 @@ fn configuration(sampling: &str, bounded: bool, obstacles: usize) -> String {
 
 /// The filter in process, and the state it goes back to.
 struct Plain {
-    filter: SafetyFilter,
+    filter: Filter,
     start: FilterState,
     u_ref: [f64; 2],
     u: [f64; 2],

@@ -105,15 +105,15 @@ fn described(centre: [f64; 2], stop_time: f64) -> FilterConfiguration {
 fn batch_row(times: u32) {
     const ROWS: usize = 10;
     let mut own = described([45.0; 2], 1.0).build_loop().expect("a filter");
-    let mut memories = vec![own.state(); ROWS];
+    let mut memories = vec![own.state().clone(); ROWS];
     let mut u = [0.0; 2];
     for i in 0..times as usize {
         let (row, sample) = (i % ROWS, i / ROWS);
         let t = 0.001 * sample as f64;
         let x = [6.0 * t, 0.1 * row as f64, 0.8, 6.0];
         own.restore(&memories[row]).expect("its own memory");
-        own.step(black_box(t), 0.001, black_box(&x), &[0.0; 2], &mut u).expect("right dimensions");
-        own.save(&mut memories[row]);
+        own.step(black_box(t), black_box(&x), &[0.0; 2], &mut u).expect("right dimensions");
+        memories[row].clone_from(own.state());
     }
 }
 

@@ -10,7 +10,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use punctual_core::dynamics::ControlAffine;
-use punctual_core::filter::{FilterBuilder, SafetyFilter, Sampling, Status};
+use punctual_core::filter::{Filter, FilterBuilder, Sampling, Status};
 use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
 use support::sources::{MODELS, derivatives, expressed, given, on_the_way, plugged};
 use support::{T, X, anchored, goal};
@@ -23,7 +23,7 @@ const BATCHES: usize = 301;
 const STEPS: usize = 400;
 
 /// Time in ns for each step of one batch.
-fn batch(filter: &mut SafetyFilter, x: &[f64]) -> f64 {
+fn batch(filter: &mut Filter, x: &[f64]) -> f64 {
     let mut u = [0.0; 2];
     let start = Instant::now();
     for _ in 0..STEPS {

@@ -11,7 +11,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use punctual_core::dynamics::{ControlAffine, rk4_step};
-use punctual_core::filter::{AssuredFilter, Driver, FilterBuilder, Sampling, Standing};
+use punctual_core::filter::{Driver, FilterBuilder, Sampling, Standing};
 use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
 use support::{ByHand, Drive, T, X, obstructed};
 
@@ -56,14 +56,14 @@ where
     let (mut shortest, mut by_plan) = (vec![f64::INFINITY; STEPS], vec![false; STEPS]);
     for _ in 0..RUNS {
         let filter = builder().bounds(&bounds.map(|b| -b), &bounds).and_then(FilterBuilder::build);
-        let filter = AssuredFilter::new(filter.expect("valid bounds"), PERIOD);
+        let filter = filter.expect("valid bounds").with_plans(PERIOD);
         let mut filter = filter.expect("a filter that can have plans");
         let (mut x, mut u) = ([0.0, 0.0, X[2], X[3]], [0.0; 2]);
         for k in 0..STEPS {
             let begin = Instant::now();
             let assurance = filter.step(PERIOD * k as f64, &x, &[0.0; 2], &mut u);
             shortest[k] = f64::min(shortest[k], begin.elapsed().as_secs_f64() * 1e9);
-            let assurance = assurance.expect("right dimensions");
+            let assurance = assurance.expect("right dimensions").assurance.expect("plans");
             if assurance.standing != Standing::Assured {
                 return None;
             }

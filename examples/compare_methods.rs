@@ -7,7 +7,7 @@
 
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
-use punctual_core::filter::{BarrierSettings, Method, SafetyFilter, Sampling};
+use punctual_core::filter::{BarrierSettings, Filter, Method, Sampling};
 use punctual_core::nalgebra::{self, Vector2, Vector4, vector};
 use punctual_reference::plants::Unicycle;
 use punctual_reference::simulation::{Schedule, closed_loop};
@@ -34,10 +34,8 @@ fn run(
     sampling: Sampling,
     nominal: fn(&Vector4<f64>) -> Vector2<f64>,
 ) -> Result<Run, punctual_core::Error> {
-    let mut filter = SafetyFilter::builder(4, 2)
-        .barrier("goal", Unicycle, barrier, settings)?
-        .sampling(sampling)?
-        .build()?;
+    let mut filter =
+        Filter::builder(4, 2).barrier("goal", Unicycle, barrier, settings)?.sampling(sampling)?.build()?;
     let schedule = Schedule { step: STEP, steps: (2.0 * DEADLINE / STEP).round() as usize, substeps: 1 };
     let mut run = Run { arrival: f64::INFINITY, outside: 0.0, peak: Vector2::zeros() };
     closed_loop(

@@ -7,7 +7,7 @@
 
 use punctual_core::barrier::Barrier;
 use punctual_core::dynamics::ControlAffine;
-use punctual_core::filter::{BarrierSettings, SafetyFilter};
+use punctual_core::filter::{BarrierSettings, Filter};
 use punctual_core::lie;
 use punctual_core::nalgebra::{self, SMatrix, SVector, Vector4, matrix, vector};
 use punctual_core::scalar::Scalar;
@@ -58,7 +58,7 @@ fn main() -> Result<(), punctual_core::Error> {
     assert_eq!(found, lie::RelativeDegree::Uniform(4));
     let source = lie::along(ARM, window, 4)?;
     let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(DEADLINE) };
-    let mut filter = SafetyFilter::builder(4, 1).source("window", source, settings)?.build()?;
+    let mut filter = Filter::builder(4, 1).source("window", source, settings)?.build()?;
 
     // 6 s in steps of 1 ms, hanging at rest. The wanted input damps the motor and does nothing else, so that
     // gravity pulls the arm down all the time.

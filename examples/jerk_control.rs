@@ -7,7 +7,7 @@
 
 use punctual_core::barrier::Barrier;
 use punctual_core::dynamics::ControlAffine;
-use punctual_core::filter::{BarrierSettings, SafetyFilter};
+use punctual_core::filter::{BarrierSettings, Filter};
 use punctual_core::nalgebra::{self, SMatrix, SVector, matrix, vector};
 use punctual_core::scalar::Scalar;
 use punctual_reference::simulation::{Schedule, closed_loop};
@@ -41,7 +41,7 @@ fn main() -> Result<(), punctual_core::Error> {
     const DEADLINE: f64 = 10.0; // s
     let settings = BarrierSettings { margin: 0.01, ..BarrierSettings::within(DEADLINE) };
     let mut filter =
-        SafetyFilter::builder(3, 1).barrier("level", Lift, Above { level: 20.0 }, settings)?.build()?;
+        Filter::builder(3, 1).barrier("level", Lift, Above { level: 20.0 }, settings)?.build()?;
     assert_eq!(filter.relative_degrees().collect::<Vec<_>>(), [3], "found, not declared");
 
     // 20 s in steps of 1 ms, from rest at 0. The wanted motion is down at 1 m/s.

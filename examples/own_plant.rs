@@ -6,7 +6,7 @@
 
 use punctual_core::barrier::Barrier;
 use punctual_core::dynamics::ControlAffine;
-use punctual_core::filter::{BarrierSettings, SafetyFilter};
+use punctual_core::filter::{BarrierSettings, Filter};
 use punctual_core::nalgebra::{self, SMatrix, SVector, matrix, vector};
 use punctual_core::scalar::Scalar;
 use punctual_reference::simulation::{Schedule, closed_loop};
@@ -44,7 +44,7 @@ fn main() -> Result<(), punctual_core::Error> {
     let cart = || Cart { drag: 0.05 };
     let settings = BarrierSettings { margin: 0.05, ..BarrierSettings::within(DEADLINE) };
     let mut filter =
-        SafetyFilter::builder(2, 1).barrier("line", cart(), Beyond { line: 20.0 }, settings)?.build()?;
+        Filter::builder(2, 1).barrier("line", cart(), Beyond { line: 20.0 }, settings)?.build()?;
 
     // 10 s in steps of 10 ms from rest at 0; the driver wants to go at -1 m/s.
     let schedule = Schedule { step: 0.01, steps: 1000, substeps: 1 };

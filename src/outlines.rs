@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use punctual_core::elementary;
-use punctual_core::filter::SafetyFilter;
+use punctual_core::filter::Filter;
 use punctual_fmu::configuration::{BarrierSection, FilterConfiguration, Shape, mentions};
 
 use crate::error::Error;
@@ -104,7 +104,7 @@ impl Outline {
 
     /// The outline of the one barrier of `built` in the square that goes `reach` to each side from the middle of `ranges`.
     fn within(
-        built: &SafetyFilter,
+        built: &Filter,
         (plane, x): ([usize; 2], &[f64]),
         t: f64,
         (ranges, reach): ([(f64, f64); 2], f64),

@@ -7,7 +7,7 @@ pub(crate) mod sources;
 use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::convergence::{FixedTime, FixedTimeSettings, FixedTimeState};
 use punctual_core::dynamics::{ControlAffine, rk4_step};
-use punctual_core::filter::{BarrierSettings, FilterBuilder, FilterState, SafetyFilter, Sampling};
+use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, FilterState, Sampling};
 use punctual_core::nalgebra::{SMatrix, SVector};
 use punctual_core::scalar::Scalar;
 use punctual_reference::plants::PointMass;
@@ -32,7 +32,7 @@ pub(crate) fn goal<P>(plant: P) -> FilterBuilder
 where
     P: ControlAffine<4, 2> + Send + 'static,
 {
-    SafetyFilter::builder(4, 2)
+    Filter::builder(4, 2)
         .barrier("goal", plant, disc(), BarrierSettings::within(DEADLINE))
         .and_then(|b| b.sampling(Sampling::Pointwise))
         .expect("valid settings")
@@ -59,7 +59,7 @@ where
 }
 
 /// The filter, anchored at rest at the origin at time 0.
-pub(crate) fn anchored(builder: FilterBuilder) -> SafetyFilter {
+pub(crate) fn anchored(builder: FilterBuilder) -> Filter {
     let mut filter = builder.build().expect("valid filter");
     filter.step(0.0, &[0.0; 4], &[0.0; 2], &mut [0.0; 2]).expect("right dimensions");
     filter
@@ -68,7 +68,7 @@ pub(crate) fn anchored(builder: FilterBuilder) -> SafetyFilter {
 /// A closed loop that was recorded and is stepped through again and again: samples of which each has the input of the one
 /// before behind it.
 pub(crate) struct Drive {
-    filter: SafetyFilter,
+    filter: Filter,
     begin: FilterState,
     samples: Vec<(f64, [f64; 4])>,
     next: usize,

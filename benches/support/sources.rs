@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter, Sampling};
+use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Sampling};
 use punctual_core::lie::{DerivativeSource, Derivatives, external};
 use punctual_fmu::configuration::PluginLoader;
 use punctual_fmu::{PluginFolder, plugin_file_name};
@@ -20,7 +20,7 @@ pub(crate) const MODELS: [(&str, [&str; 4]); 3] = [
 ];
 
 fn filter(states: usize, source: Box<dyn DerivativeSource>) -> FilterBuilder {
-    SafetyFilter::builder(states, 2)
+    Filter::builder(states, 2)
         .source("goal", source, BarrierSettings::within(DEADLINE))
         .and_then(|b| b.sampling(Sampling::Pointwise))
         .expect("valid settings")

@@ -46,7 +46,7 @@ pub trait Barrier<const NX: usize> {
     }
 
     /// The least and the largest value of h from `t` (s) on while the state stays `x`, infinite where there is none. `None`,
-    /// the default, where they are not known: then a set that moves is not [assured](crate::filter::AssuredFilter).
+    /// the default, where they are not known: then a set that moves is not [assured](crate::filter::Filter).
     fn range_from(&self, _t: f64, _x: &SVector<f64, NX>) -> Option<[f64; 2]> {
         None
     }

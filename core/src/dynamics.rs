@@ -239,12 +239,12 @@ where
 /// ```
 /// use punctual_core::barriers::{DistanceDisc, Outside};
 /// use punctual_core::dynamics::WithPoint;
-/// use punctual_core::filter::{BarrierSettings, SafetyFilter};
+/// use punctual_core::filter::{BarrierSettings, Filter};
 /// use punctual_reference::plants::Unicycle;
 ///
 /// // State (x_p, y_p, θ, v, p_x, p_y, v_x, v_y).
 /// let clear = Outside(DistanceDisc::new([0.0, 0.0], 2.0, 2.0)?.following(4));
-/// let filter = SafetyFilter::builder(8, 2)
+/// let filter = Filter::builder(8, 2)
 ///     .barrier::<_, _, 8, 2>("clear", WithPoint::<_, 4>(Unicycle), clear, BarrierSettings::within(5.0))?
 ///     .build()?;
 /// # Ok::<(), punctual_core::Error>(())

@@ -6,12 +6,12 @@
 //!
 //! ```
 //! use punctual_core::barriers::DistanceDisc;
-//! use punctual_core::filter::{BarrierSettings, SafetyFilter};
+//! use punctual_core::filter::{BarrierSettings, Filter};
 //! use punctual_reference::plants::PointMass;
 //!
 //! // Reach the disc of radius 2 m around (45, 45) within 10 s.
 //! let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
-//! let mut filter = SafetyFilter::builder(4, 2)
+//! let mut filter = Filter::builder(4, 2)
 //!     .barrier("goal", PointMass, goal, BarrierSettings::within(10.0))?
 //!     .build()?;
 //! let mut u = [0.0; 2];
@@ -64,7 +64,7 @@
 //! | `std` (default) | Rust's standard library in the dependencies. Without it the crate needs `alloc` only. |
 //! | `serde` | `Serialize` and `Deserialize` for states, reports, settings and derivatives. |
 //! | `interior-point` | a second solver of the quadratic program, to compare with. Needs `std`. |
-//! | `plan` | plans: `filter::AssuredFilter` promises only what a verified plan keeps. Needs `std`. |
+//! | `plan` | plans: `filter::Filter` promises only what a verified plan keeps. Needs `std`. |
 //!
 //! A filter gives the same bits on every operating system and processor: [`elementary`] functions (sin, exp, …) are those
 //! of the crate [`libm`](https://docs.rs/libm), not the platform's, and nothing fuses a multiplication with an addition.

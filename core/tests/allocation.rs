@@ -1,11 +1,11 @@
-//! The promise of `SafetyFilter::step`: it does not allocate.
+//! The promise of `Filter::step`: it does not allocate.
 //!
 //! The allocator of this test binary counts, thread by thread.
 
 mod scenario;
 
 use punctual_core::convergence::repeated_root;
-use punctual_core::filter::{BarrierSettings, Method, SafetyFilter, SampleDerivative, Sampling, Status};
+use punctual_core::filter::{BarrierSettings, Filter, Method, SampleDerivative, Sampling, Status};
 use punctual_core::lie::Direction;
 use punctual_core::qp::Solver;
 use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
@@ -22,23 +22,23 @@ fn the_counter_counts() {
     assert_eq!(allocations(|| drop(std::hint::black_box(vec![0_u8; 100]))), 1);
 }
 
-fn filters() -> Vec<(&'static str, SafetyFilter)> {
+fn filters() -> Vec<(&'static str, Filter)> {
     let settings = BarrierSettings::within(5.0);
     let repeated = BarrierSettings { method: Method::RepeatedRoot, ..settings };
-    let bounded = SafetyFilter::builder(4, 2)
+    let bounded = Filter::builder(4, 2)
         .barrier("goal", PointMass, distance_disc(), settings)
         .and_then(|b| b.bounds(&[-50.0, -50.0], &[50.0, 50.0]))
         .and_then(punctual_core::filter::FilterBuilder::build)
         .expect("valid filter");
     let sampled = |sampling: Sampling| {
-        SafetyFilter::builder(4, 2)
+        Filter::builder(4, 2)
             .barrier("goal", Unicycle, distance_disc(), settings)
             .and_then(|b| b.sampling(sampling))
             .and_then(punctual_core::filter::FilterBuilder::build)
             .expect("valid filter")
     };
     let several = |sampling: Sampling| {
-        SafetyFilter::builder(4, 2)
+        Filter::builder(4, 2)
             .barrier("goal", PointMass, distance_disc(), settings)
             .and_then(|b| b.barrier("soon", PointMass, distance_disc(), BarrierSettings::within(3.0)))
             .and_then(|b| b.barrier("near", PointMass, quadratic_disc(), BarrierSettings::within(4.0)))

@@ -5,8 +5,8 @@ mod scenario;
 
 use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::filter::{
-    AssuredFilter, BarrierSettings, FilterBuilder, FilterState, Phase, Report, SafetyFilter,
-    SampleDerivative, Sampling, Standing, Status,
+    BarrierSettings, Filter, FilterBuilder, FilterState, Phase, Report, SampleDerivative, Sampling, Standing,
+    Status,
 };
 use punctual_core::lie::Direction;
 use punctual_reference::plants::PointMass;
@@ -15,9 +15,9 @@ const BOUNDS: [f64; 2] = [8.0, 6.0];
 const AFTER: f64 = 0.35;
 
 /// A goal within 6 s and an obstacle on the way, armed `after` s.
-fn filter(after: f64, sampling: Sampling, delay: f64) -> SafetyFilter {
+fn filter(after: f64, sampling: Sampling, delay: f64) -> Filter {
     let disc = |centre, radius| DistanceDisc::new(centre, radius, 1.0).expect("valid disc");
-    SafetyFilter::builder(4, 2)
+    Filter::builder(4, 2)
         .barrier("goal", PointMass, disc([20.0, 12.0], 2.0), BarrierSettings::within(6.0))
         .and_then(|b| {
             b.barrier("rock", PointMass, Outside(disc([10.0, 7.0], 2.0)), BarrierSettings::keeping())
@@ -46,7 +46,7 @@ fn at(t: f64) -> ([f64; 4], [f64; 2]) {
     ([1.0 + 2.0 * s, 0.5 + s, 2.0, 1.0], [12.0 * (3.0 * s).sin(), -5.0 * (2.0 * s).cos()])
 }
 
-fn step(filter: &mut SafetyFilter, t: f64) -> ([u64; 2], Report) {
+fn step(filter: &mut Filter, t: f64) -> ([u64; 2], Report) {
     let ((x, u_ref), mut u) = (at(t), [f64::NAN; 2]);
     let report = filter.step(t, &x, &u_ref, &mut u).expect("right lengths").clone();
     (u.map(f64::to_bits), report)
@@ -146,7 +146,7 @@ fn rearming_does_not_make_it_wait_again() {
 #[test]
 fn invalid_samples_begin_the_wait_and_do_not_end_it() {
     let mut filter = filter(AFTER, Sampling::Period(0.1), 0.0);
-    let invalid = |filter: &mut SafetyFilter, t: f64| {
+    let invalid = |filter: &mut Filter, t: f64| {
         let mut u = [f64::NAN; 2];
         filter.step(t, &[f64::NAN; 4], &[0.0; 2], &mut u).expect("right lengths").status
     };
@@ -229,30 +229,31 @@ fn the_derivative_is_that_of_u_ref_and_h() {
 /// Plans are decided on at the sample at which the filter is armed, from the state that is there then.
 #[test]
 fn plans_are_decided_on_when_it_is_armed() {
-    let assured =
-        |after| AssuredFilter::new(filter(after, Sampling::Period(0.1), 0.0), 0.1).expect("a filter");
+    let assured = |after| filter(after, Sampling::Period(0.1), 0.0).with_plans(0.1).expect("a filter");
     let (mut late, mut fresh) = (assured(0.5), assured(0.0));
     let mut moved = [1.0, 0.5, 2.0, 1.0];
     let hostile = [-20.0, 20.0];
     let mut derivative = SampleDerivative::default();
     for k in 0..80 {
         let (t, mut u) = (0.1 * f64::from(k), [0.0; 2]);
-        let assurance = *late.step(t, &moved, &hostile, &mut u).expect("right lengths");
+        let assurance =
+            late.step(t, &moved, &hostile, &mut u).expect("right lengths").assurance.expect("plans");
         if k < 5 {
             assert_eq!((assurance.standing, assurance.until), (Standing::Undecided, None), "at {t}");
             assert_eq!((late.report().status, u), (Status::NotArmed, [-8.0, 6.0]));
             assert!(late.plan().is_none() && late.report().barriers.iter().all(|b| !b.guaranteed));
             // Nor is it decided on where u_ref is no number.
-            let unwanted = *late.peek(t, &moved, &[f64::NAN, 0.0], &mut [0.0; 2]).expect("right lengths");
+            let unwanted = late.peek(t, &moved, &[f64::NAN, 0.0], &mut [0.0; 2]);
+            let unwanted = unwanted.expect("right lengths").assurance.expect("plans");
             assert_eq!(
                 (unwanted.standing, late.report().status),
                 (Standing::Undecided, Status::InvalidInput)
             );
             // Taken back and made again, in an instance of its own too.
-            let (state, commitment) = (late.filter().state().clone(), late.commitment().clone());
-            late.restore(&state, &commitment).expect("its own");
+            let state = late.state().clone();
+            late.restore(&state).expect("its own");
             let mut other = assured(0.5);
-            other.restore(&state, &commitment).expect("that of an equal one");
+            other.restore(&state).expect("that of an equal one");
             let mut ahead = [0.0; 2];
             let later = other.step(0.7, &moved, &hostile, &mut ahead).expect("right lengths");
             assert!(later.is_assured(), "decided when it is due, whatever was skipped");
@@ -261,7 +262,8 @@ fn plans_are_decided_on_when_it_is_armed() {
             assert_eq!((unknown.expect("right lengths"), &derivative.u[..2]), (None, &[1.0, 0.0][..]));
         } else {
             let mut wanted = [0.0; 2];
-            let other = *fresh.step(t, &moved, &hostile, &mut wanted).expect("right lengths");
+            let other = fresh.step(t, &moved, &hostile, &mut wanted).expect("right lengths");
+            let other = other.assurance.expect("plans");
             assert_eq!((assurance, u.map(f64::to_bits)), (other, wanted.map(f64::to_bits)), "at {t}");
             assert!(assurance.is_assured(), "at {t}: {assurance:?}");
         }
@@ -274,7 +276,7 @@ fn plans_are_decided_on_when_it_is_armed() {
     assert!(late.report().barriers[0].h >= 0.0, "6 s after the filter was armed it is there");
     // A re-arming forgets the plan, and decides anew at once.
     late.rearm();
-    assert_eq!(late.assurance().standing, Standing::Undecided);
+    assert_eq!(late.assurance().expect("plans").standing, Standing::Undecided);
     let mut u = [0.0; 2];
     assert!(late.step(8.0, &moved, &[0.0; 2], &mut u).expect("right lengths").is_assured());
 }
@@ -282,7 +284,7 @@ fn plans_are_decided_on_when_it_is_armed() {
 #[test]
 fn a_time_that_is_none_is_refused() {
     for bad in [-1e-9, f64::NAN, f64::INFINITY] {
-        let error = SafetyFilter::builder(4, 2).arm_after(bad).err().expect("out of range").to_string();
+        let error = Filter::builder(4, 2).arm_after(bad).err().expect("out of range").to_string();
         assert_eq!(error, format!("arm_after: is {bad}, must be finite and >= 0"));
     }
 }

@@ -5,7 +5,7 @@ mod support;
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::dynamics::{ControlAffine, DynPlant, IntegratedInput, rk4_step};
-use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter};
+use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder};
 use punctual_core::lie::{self, Derivatives, RelativeDegree, detected, relative_degree};
 use punctual_core::nalgebra::{SMatrix, SVector, Vector4, vector};
 use punctual_core::scalar::Scalar;
@@ -25,13 +25,13 @@ fn kinematic() -> KinematicBicycle {
     KinematicBicycle::new(1.2, 1.6).expect("valid bicycle")
 }
 
-fn filter_of<P, B, const NX: usize, const NU: usize>(plant: P, barrier: B) -> Result<SafetyFilter, Error>
+fn filter_of<P, B, const NX: usize, const NU: usize>(plant: P, barrier: B) -> Result<Filter, Error>
 where
     P: ControlAffine<NX, NU> + Send + 'static,
     B: Barrier<NX> + Send + 'static,
 {
     let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(5.0) };
-    SafetyFilter::builder(NX, NU).barrier("goal", plant, barrier, settings).and_then(FilterBuilder::build)
+    Filter::builder(NX, NU).barrier("goal", plant, barrier, settings).and_then(FilterBuilder::build)
 }
 
 #[test]
@@ -159,7 +159,7 @@ fn what_no_input_reaches_is_refused() {
 #[test]
 fn a_declared_degree_is_compared() {
     let declared = |n: usize, samples: &[Vector4<f64>]| {
-        SafetyFilter::builder(4, 2)
+        Filter::builder(4, 2)
             .barrier_of_degree("goal", Unicycle, distance_disc(), (n, samples), BarrierSettings::within(5.0))
             .and_then(FilterBuilder::build)
             .map(|f| f.relative_degrees().collect::<Vec<_>>())
@@ -181,7 +181,7 @@ fn a_declared_degree_is_compared() {
 
 #[test]
 fn the_degree_found_is_the_one_used() {
-    let degrees = |f: &SafetyFilter| f.relative_degrees().collect::<Vec<_>>();
+    let degrees = |f: &Filter| f.relative_degrees().collect::<Vec<_>>();
     assert_eq!(degrees(&filter_of(Unicycle, SpeedLimit).expect("valid")), [1]);
     assert_eq!(degrees(&filter_of(Cart, Powers).expect("valid")), [2]);
 }

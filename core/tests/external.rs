@@ -2,7 +2,7 @@
 //! derivative of a sample.
 
 use punctual_core::barriers::{DistanceDisc, NormBound};
-use punctual_core::filter::{BarrierSettings, SafetyFilter, SampleDerivative, Sampling, Status};
+use punctual_core::filter::{BarrierSettings, Filter, SampleDerivative, Sampling, Status};
 use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives, Direction};
 use punctual_reference::plants::Unicycle;
 
@@ -20,11 +20,11 @@ fn sources() -> [Box<dyn DerivativeSource>; 2] {
     [lie::along(Unicycle, goal, 2).expect("in range"), lie::along(Unicycle, speed, 1).expect("in range")]
 }
 
-fn filter(sources: [Box<dyn DerivativeSource>; 2]) -> SafetyFilter {
+fn filter(sources: [Box<dyn DerivativeSource>; 2]) -> Filter {
     let settings = BarrierSettings { margin: 0.1, ..BarrierSettings::within(DEADLINE) };
     let dim = sources[0].state_dim();
     let [goal, speed] = sources;
-    SafetyFilter::builder(dim, INPUTS)
+    Filter::builder(dim, INPUTS)
         .source("goal", goal, settings)
         .and_then(|b| b.source("speed", speed, settings))
         .and_then(|b| b.bounds(&[-30.0; INPUTS], &[30.0; INPUTS]))
@@ -34,7 +34,7 @@ fn filter(sources: [Box<dyn DerivativeSource>; 2]) -> SafetyFilter {
 }
 
 /// The filter whose state is the stacks of both barriers.
-fn external() -> SafetyFilter {
+fn external() -> Filter {
     let picked = |n: usize, first: usize| {
         let picks: Vec<usize> = (first..first + n + 1 + INPUTS).collect();
         lie::embedded(lie::external(n, INPUTS).expect("in range"), 9, &picks).expect("valid picks")
@@ -118,7 +118,7 @@ fn without_a_prediction_a_step_is_pointwise_and_a_delay_refused() {
     let settings = BarrierSettings { margin: 0.1, ..BarrierSettings::within(DEADLINE) };
     let builder = || {
         let source = lie::external(1, 1).expect("in range");
-        SafetyFilter::builder(3, 1).source("h", source, settings).expect("valid settings")
+        Filter::builder(3, 1).source("h", source, settings).expect("valid settings")
     };
     let mut filter = builder().sampling(Sampling::Period(0.1)).and_then(|b| b.build()).expect("a filter");
     let mut u = [0.0];

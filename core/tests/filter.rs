@@ -7,7 +7,7 @@ use punctual_core::barrier::Barrier;
 use punctual_core::convergence::FixedTimeState;
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{
-    BarrierSettings, FilterBuilder, FilterState, Method, Phase, SafetyFilter, Sampling, Status,
+    BarrierSettings, Filter, FilterBuilder, FilterState, Method, Phase, Sampling, Status,
 };
 use punctual_core::lie;
 use punctual_core::nalgebra::{SVector, vector};
@@ -17,19 +17,19 @@ use punctual_reference::simulation::{Schedule, closed_loop};
 use scenario::{Integrator, NonNegative, damping, distance_disc, goal, one, quadratic_disc, speed_damping};
 
 /// One step; returns the input with the report's status.
-fn step(filter: &mut SafetyFilter, t: f64, x: &[f64]) -> ([f64; 2], Status) {
+fn step(filter: &mut Filter, t: f64, x: &[f64]) -> ([f64; 2], Status) {
     let mut u = [f64::NAN; 2];
     let status = filter.step(t, x, &[0.0; 2], &mut u).expect("right dimensions").status;
     (u, status)
 }
 
 /// A filter without regard to how long inputs are held.
-fn pointwise<P, B>(plant: P, barrier: B, settings: BarrierSettings) -> SafetyFilter
+fn pointwise<P, B>(plant: P, barrier: B, settings: BarrierSettings) -> Filter
 where
     P: ControlAffine<4, 2> + Send + 'static,
     B: Barrier<4> + Send + 'static,
 {
-    SafetyFilter::builder(4, 2)
+    Filter::builder(4, 2)
         .barrier("goal", plant, barrier, settings)
         .and_then(|b| b.sampling(Sampling::Pointwise))
         .and_then(FilterBuilder::build)
@@ -72,7 +72,7 @@ fn late_stay_left_and_back() {
     let mut filter = pointwise(PointMass, distance_disc(), BarrierSettings::within(1.0));
     let outside = [0.0, 0.0, 0.0, 0.0];
     let inside = [45.0, 44.5, 0.0, 0.0];
-    let phase = |filter: &mut SafetyFilter, t: f64, x: &[f64; 4]| {
+    let phase = |filter: &mut Filter, t: f64, x: &[f64; 4]| {
         step(filter, t, x);
         let b = filter.report().barriers[0];
         (b.phase, b.on_course, b.arrival_time)
@@ -121,7 +121,7 @@ fn a_start_inside_that_cannot_stay_is_not_promised() {
 
 #[test]
 fn anchoring_waits_for_the_first_valid_sample() {
-    let mut filter = SafetyFilter::builder(4, 2)
+    let mut filter = Filter::builder(4, 2)
         .barrier("goal", PointMass, distance_disc(), BarrierSettings::within(5.0))
         .and_then(|b| b.bounds(&[1.0, -60.0], &[60.0, 60.0]))
         .and_then(FilterBuilder::build)
@@ -239,7 +239,7 @@ fn the_arrival_of_a_bounded_one_dimensional_run_is_on_time() {
         stay_rate: Some(3.0),
         ..BarrierSettings::within(5.0)
     };
-    let mut filter = SafetyFilter::builder(2, 1)
+    let mut filter = Filter::builder(2, 1)
         .source("line", source, settings)
         .and_then(|b| b.bounds(&[-1.0], &[1.0]))
         .and_then(FilterBuilder::build)
@@ -315,7 +315,7 @@ proptest! {
         samples in prop::collection::vec((any::<f64>(), prop::array::uniform4(any::<f64>()), prop::array::uniform2(any::<f64>())), 1..6),
         bounded in any::<bool>(),
     ) {
-        let mut builder = SafetyFilter::builder(4, 2)
+        let mut builder = Filter::builder(4, 2)
             .barrier("goal", Unicycle, distance_disc(), BarrierSettings::within(5.0)).expect("valid settings");
         let high = if bounded { [60.0, 20.0] } else { [f64::INFINITY; 2] };
         builder = builder.bounds(&high.map(|v| -v), &high).expect("valid bounds");
@@ -330,7 +330,7 @@ proptest! {
 
 #[test]
 fn two_barriers_are_both_met() {
-    let mut filter = SafetyFilter::builder(4, 2)
+    let mut filter = Filter::builder(4, 2)
         .barrier(
             "goal",
             PointMass,
@@ -365,7 +365,7 @@ fn two_barriers_are_both_met() {
 
 #[test]
 fn bounds_that_forbid_the_row_are_infeasible_and_void_the_guarantee() {
-    let mut filter = SafetyFilter::builder(4, 2)
+    let mut filter = Filter::builder(4, 2)
         .barrier("goal", PointMass, distance_disc(), BarrierSettings::within(0.5))
         .and_then(|b| b.bounds(&[-1.0, -2.0], &[1.0, 2.0]))
         .and_then(FilterBuilder::build)
@@ -402,14 +402,14 @@ fn the_centre_of_the_quadratic_disc_is_ill_conditioned() {
     assert_eq!((u, status), ([0.0, 0.0], Status::Unchanged));
 }
 
-fn goal_quadratic(deadline: f64) -> SafetyFilter {
+fn goal_quadratic(deadline: f64) -> Filter {
     pointwise(PointMass, quadratic_disc(), BarrierSettings::within(deadline))
 }
 
 /// One barrier without finite derivatives stops the step: no other barrier is anchored by it.
 #[test]
 fn a_singular_barrier_anchors_none() {
-    let mut filter = SafetyFilter::builder(4, 2)
+    let mut filter = Filter::builder(4, 2)
         .barrier("line", PointMass, NonNegative, BarrierSettings::within(2.0))
         .and_then(|b| b.barrier("goal", PointMass, distance_disc(), BarrierSettings::within(2.0)))
         .and_then(FilterBuilder::build)

@@ -8,8 +8,7 @@ use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, Outside, StateBound};
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{
-    AssuredFilter, BarrierSettings, Begin, Commitment, End, FilterBuilder, FilterState, Pace, SafetyFilter,
-    Sampling, Standing,
+    BarrierSettings, Begin, End, Filter, FilterBuilder, FilterState, Plans, Sampling, Standing,
 };
 use punctual_core::plan::Failure;
 use punctual_core::scalar::Scalar;
@@ -80,7 +79,7 @@ trait World {
     fn bounds(&self) -> Vec<f64>;
     /// h of each.
     fn barriers(&self, t: f64, x: &[f64]) -> Vec<f64>;
-    fn filter(&self) -> SafetyFilter;
+    fn filter(&self) -> Filter;
     fn deadline(&self) -> f64;
 
     fn move_by(&self, x: &[f64], u: &[f64], dt: f64) -> Vec<f64> {
@@ -101,7 +100,7 @@ fn keeping() -> BarrierSettings {
     BarrierSettings { margin: 0.02, ..BarrierSettings::keeping() }
 }
 
-fn built(builder: Result<FilterBuilder, punctual_core::Error>, bounds: &[f64]) -> SafetyFilter {
+fn built(builder: Result<FilterBuilder, punctual_core::Error>, bounds: &[f64]) -> Filter {
     let least: Vec<f64> = bounds.iter().map(|b| -b).collect();
     builder
         .and_then(|b| b.bounds(&least, bounds))
@@ -145,9 +144,9 @@ impl World for Loiter {
         let far = |(c, _): ([f64; 2], f64)| (x[0] - c[0]).hypot(x[1] - c[1]);
         vec![self.goal.1 - far(self.goal), far(self.tower) - self.tower.1]
     }
-    fn filter(&self) -> SafetyFilter {
+    fn filter(&self) -> Filter {
         let disc = |(centre, radius)| DistanceDisc::new(centre, radius, 1.0).expect("valid disc");
-        let builder = SafetyFilter::builder(3, 1)
+        let builder = Filter::builder(3, 1)
             .barrier("goal", Glider(self.speed), disc(self.goal), within(self.deadline))
             .and_then(|b| b.barrier("tower", Glider(self.speed), Outside(disc(self.tower)), keeping()));
         built(builder, &self.bounds())
@@ -195,11 +194,11 @@ impl World for Chase {
         let far = (x[0] - c[0]).hypot(x[1] - c[1]);
         vec![self.disc.radius - far, x[3] - self.speeds[0], self.speeds[1] - x[3]]
     }
-    fn filter(&self) -> SafetyFilter {
+    fn filter(&self) -> Filter {
         let [slow, fast] = [StateBound::at_least(3, self.speeds[0]), StateBound::at_most(3, self.speeds[1])]
             .map(|bound| bound.expect("a bound"));
         let settings = BarrierSettings { margin: 0.0, ..keeping() };
-        let builder = SafetyFilter::builder(4, 2)
+        let builder = Filter::builder(4, 2)
             .barrier("disc", Unicycle, self.disc, within(self.deadline))
             .and_then(|b| b.barrier("slow", Unicycle, slow, settings))
             .and_then(|b| b.barrier("fast", Unicycle, fast, settings));
@@ -222,8 +221,8 @@ enum Came {
 
 /// Runs `world` from `x` for `length` s with the wanted input number `kind`, and asserts what is promised.
 fn run<W: World>(world: &W, mut x: Vec<f64>, kind: u64, length: f64, random: &mut Random) -> Came {
-    let pace = Pace { period: PERIOD, horizon: Some(HORIZON) };
-    let mut filter = AssuredFilter::new(world.filter(), pace).expect("a filter that can be assured");
+    let plans = Plans::every(PERIOD).horizon(HORIZON);
+    let mut filter = world.filter().with_plans(plans).expect("a filter that can be assured");
     let (bounds, mut until, mut u) = (world.bounds(), 0.0, vec![0.0; W::INPUTS]);
     let mut drawn = vec![0.0; W::INPUTS];
     let inside: Vec<bool> = world.barriers(0.0, &x).into_iter().map(|h| h >= 0.0).collect();
@@ -239,7 +238,8 @@ fn run<W: World>(world: &W, mut x: Vec<f64>, kind: u64, length: f64, random: &mu
             2 => bounds.iter().map(|b| -3.0 * b).collect(),
             _ => drawn.clone(),
         };
-        let assurance = *filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
+        let assurance =
+            filter.step(t, &x, &u_ref, &mut u).expect("right dimensions").assurance.expect("plans");
         match assurance.standing {
             Standing::Refused => return Came::Refused(assurance.failure),
             Standing::Expired => {
@@ -319,9 +319,9 @@ impl<const NX: usize> Barrier<NX> for Fleeing {
     }
 }
 
-fn fleeing(horizon: Option<f64>) -> Result<AssuredFilter, punctual_core::Error> {
-    let builder = SafetyFilter::builder(4, 2).barrier("strip", Unicycle, Fleeing, keeping());
-    AssuredFilter::new(built(builder, &[1.0, 1.0]), Pace { period: PERIOD, horizon })
+fn fleeing(horizon: Option<f64>) -> Result<Filter, punctual_core::Error> {
+    let builder = Filter::builder(4, 2).barrier("strip", Unicycle, Fleeing, keeping());
+    built(builder, &[1.0, 1.0]).with_plans(Plans::every(PERIOD).horizon(horizon))
 }
 
 #[test]
@@ -331,20 +331,20 @@ fn what_cannot_be_followed_for_ever_is_promised_until_a_time() {
     let (mut x, mut u, mut until, mut ended) = (vec![0.0; 4], [0.0; 2], 0.0, None);
     for k in 0..300 {
         let t = f64::from(k) * PERIOD;
-        let assurance = *filter.step(t, &x, &[0.0; 2], &mut u).expect("right dimensions");
+        let assurance =
+            filter.step(t, &x, &[0.0; 2], &mut u).expect("right dimensions").assurance.expect("plans");
         assert_eq!(filter.report().barriers[0].guaranteed, assurance.is_assured(), "{t}");
         assert_eq!(filter.plan().map(|plan| plan.until), assurance.until, "{t}");
         // It goes on after a restored state as it would have.
         if k % 50 == 20 {
-            let text = serde_json::to_string(&(filter.filter().state(), filter.commitment())).expect("JSON");
-            let (state, commitment): (FilterState, Commitment) =
-                serde_json::from_str(&text).expect("as written");
-            other.restore(&state, &commitment).expect("a state of its own");
-            assert_eq!(other.assurance().until, assurance.until);
+            let text = serde_json::to_string(filter.state()).expect("JSON");
+            let state: FilterState = serde_json::from_str(&text).expect("as written");
+            other.restore(&state).expect("a state of its own");
+            assert_eq!(other.assurance().expect("plans").until, assurance.until);
         } else if k > 20 {
             let mut again = [0.0; 2];
             other.step(t, &x, &[0.0; 2], &mut again).expect("right dimensions");
-            assert_eq!((again, other.assurance()), (u, &assurance), "{t}");
+            assert_eq!((again, other.assurance().expect("plans")), (u, &assurance), "{t}");
         }
         match (assurance.standing, ended) {
             (Standing::Assured, None) => until = assurance.until.expect("a time"),
@@ -403,13 +403,13 @@ impl<const NX: usize> Barrier<NX> for Pulse {
 fn a_set_that_moves_once_is_not_promised_for_ever() {
     let mut random = Random(0x9E37_79B9_7F4A_7C15);
     let assured = |pulse: Pulse, end: End| {
-        let builder = SafetyFilter::builder(4, 2)
+        let builder = Filter::builder(4, 2)
             .barrier("goal", PointMass, DistanceDisc::new([3.0, 0.0], 1.0, 1.0).expect("a disc"), keeping())
             .and_then(|b| {
                 b.barrier("gate", PointMass, pulse, BarrierSettings { deadline: None, ..keeping() })
             })
             .and_then(|b| b.window(Begin::AtOnce, end));
-        AssuredFilter::new(built(builder, &[2.0, 2.0]), PERIOD)
+        built(builder, &[2.0, 2.0]).with_plans(PERIOD)
     };
     for draw in 0..40 {
         let (at, width) = (10.0_f64.powf(random.between(0.5, 5.0)), 10.0_f64.powf(random.between(-3.0, 1.0)));
@@ -422,13 +422,18 @@ fn a_set_that_moves_once_is_not_promised_for_ever() {
         if draw % 8 == 0 {
             let mut u = [0.0; 2];
             let mut ends = assured(pulse, End::At(at + 10.0 * width)).expect("one that ends");
-            let assurance = ends.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions");
+            let assurance = ends
+                .step(0.0, &[0.0; 4], &[0.0; 2], &mut u)
+                .expect("right dimensions")
+                .assurance
+                .expect("plans");
             assert!(!assurance.is_assured(), "{pulse:?}: {assurance:?}");
         }
     }
     let mut still =
         assured(Pulse { at: 40.0, width: 0.5, depth: 0.0 }, End::Never).expect("a set that is still");
     let mut u = [0.0; 2];
-    let assurance = still.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions");
+    let assurance =
+        still.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions").assurance.expect("plans");
     assert!(assurance.is_assured(), "{assurance:?}");
 }

@@ -6,7 +6,7 @@
 mod quadratic;
 
 use punctual_core::barriers::HalfPlane;
-use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter, Sampling, Status, Strictness};
+use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Sampling, Status, Strictness};
 use punctual_core::qp::{Bounds, Enforcement, Outcome, Problem, Row, Workspace};
 use punctual_reference::plants::PointMass;
 use quadratic::{bounds, row};
@@ -195,7 +195,7 @@ fn side(normal: f64, x: f64) -> HalfPlane {
 fn wall_before_goal(priorities: Option<[u32; 2]>) -> FilterBuilder {
     let slow = BarrierSettings { rate: Some(1.0), stay_rate: Some(1.0), ..BarrierSettings::within(1.0) };
     let [goal, wall] = priorities.map_or([Strictness::KeepFirst; 2], |p| p.map(Strictness::Priority));
-    SafetyFilter::builder(4, 2)
+    Filter::builder(4, 2)
         .barrier("goal", PointMass, side(1.0, 2.0), BarrierSettings::within(1.0))
         .and_then(|b| b.strictness(goal))
         .and_then(|b| b.barrier("wall", PointMass, side(-1.0, 1.0), slow))
@@ -206,7 +206,7 @@ fn wall_before_goal(priorities: Option<[u32; 2]>) -> FilterBuilder {
 fn situations() -> Vec<Situation> {
     let one = |name: &str, barrier, seconds: f64| {
         let settings = BarrierSettings::within(seconds);
-        SafetyFilter::builder(4, 2).barrier(name, PointMass, barrier, settings).expect("valid barrier")
+        Filter::builder(4, 2).barrier(name, PointMass, barrier, settings).expect("valid barrier")
     };
     vec![
         Situation {
@@ -243,7 +243,7 @@ fn situations() -> Vec<Situation> {
             filter: {
                 let slow =
                     BarrierSettings { rate: Some(1.0), stay_rate: Some(1.0), ..BarrierSettings::within(1.0) };
-                let wall = SafetyFilter::builder(4, 2).barrier("wall", PointMass, side(-1.0, 1.0), slow);
+                let wall = Filter::builder(4, 2).barrier("wall", PointMass, side(-1.0, 1.0), slow);
                 wall.expect("valid barrier")
             },
             x: [0.5, 0.0, 3.0, 0.0],

@@ -5,7 +5,7 @@
 mod support;
 
 use punctual_core::ErrorKind;
-use punctual_core::filter::{BarrierSettings, SafetyFilter, Status};
+use punctual_core::filter::{BarrierSettings, Filter, Status};
 use punctual_core::lie::{self, Ahead, Derivatives};
 use punctual_reference::plants::{PointMass, Unicycle};
 use support::{SpeedLimit, quadratic_disc, source};
@@ -82,7 +82,7 @@ fn a_degree_declared_too_high_is_seen_and_refused_at_the_step() {
     // h = 30 − v²/4, so ∂ḣ/∂a = −v/2.
     assert_eq!(found.lower_sensitivity, 1.5);
 
-    let mut filter = SafetyFilter::builder(4, 2)
+    let mut filter = Filter::builder(4, 2)
         .source("speed", source, BarrierSettings::within(5.0))
         .and_then(punctual_core::filter::FilterBuilder::build)
         .expect("valid filter");

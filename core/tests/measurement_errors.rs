@@ -4,9 +4,7 @@ mod support;
 
 use punctual_core::Error;
 use punctual_core::barriers::StateBound;
-use punctual_core::filter::{
-    BarrierSettings, FilterBuilder, Method, SafetyFilter, SampleDerivative, Sampling,
-};
+use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Method, SampleDerivative, Sampling};
 use punctual_core::lie;
 use punctual_reference::plants::{PointMass, Unicycle};
 use support::distance_disc;
@@ -18,8 +16,8 @@ fn settings() -> BarrierSettings {
     BarrierSettings { rate: Some(2.0), stay_rate: Some(2.0), margin: 0.1, ..BarrierSettings::within(10.0) }
 }
 
-fn unicycle(errors: &[f64]) -> SafetyFilter {
-    SafetyFilter::builder(4, 2)
+fn unicycle(errors: &[f64]) -> Filter {
+    Filter::builder(4, 2)
         .barrier("goal", Unicycle, distance_disc(), settings())
         .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
         .and_then(|b| b.measurement_errors(errors))
@@ -33,7 +31,7 @@ fn unicycle(errors: &[f64]) -> SafetyFilter {
 fn with_linear_derivatives_it_is_the_filter_of_the_worst_state() {
     let line = || StateBound::at_least(0, 30.0).expect("a valid barrier");
     let filter = |errors: &[f64]| {
-        SafetyFilter::builder(4, 2)
+        Filter::builder(4, 2)
             .barrier("line", PointMass, line(), settings())
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(|b| b.measurement_errors(errors))
@@ -59,7 +57,7 @@ fn with_linear_derivatives_it_is_the_filter_of_the_worst_state() {
 #[test]
 fn errors_of_zero_are_none() {
     let mut filters = [unicycle(&[0.0; 4]), {
-        SafetyFilter::builder(4, 2)
+        Filter::builder(4, 2)
             .barrier("goal", Unicycle, distance_disc(), settings())
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(|b| b.build())
@@ -133,11 +131,9 @@ fn derivatives_with_errors_are_those_of_the_sample() {
 #[test]
 fn what_is_refused() {
     let builder = |settings| {
-        SafetyFilter::builder(4, 2)
-            .barrier("goal", Unicycle, distance_disc(), settings)
-            .expect("a valid barrier")
+        Filter::builder(4, 2).barrier("goal", Unicycle, distance_disc(), settings).expect("a valid barrier")
     };
-    let refused = |message: &str, done: Result<SafetyFilter, Error>| {
+    let refused = |message: &str, done: Result<Filter, Error>| {
         assert_eq!(done.err().map(|e| e.to_string()).as_deref(), Some(message));
     };
     let errors = [0.1, 0.0, 0.0, 0.0];
@@ -164,7 +160,7 @@ fn what_is_refused() {
         done,
     );
     // h and the two parts of its row.
-    let done = SafetyFilter::builder(4, 2)
+    let done = Filter::builder(4, 2)
         .source("goal", lie::external(1, 2).expect("in range"), settings())
         .and_then(|b| b.measurement_errors(&errors))
         .and_then(FilterBuilder::build);

@@ -12,8 +12,8 @@ use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, Outside, QuadraticDisc, StateBound};
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{
-    AssuredFilter, BarrierSettings, Begin, Commitment, Driver, End, FilterBuilder, FilterState, Infeasible,
-    IntegratedFilter, Integration, Phase, SafetyFilter, SampleDerivative, Sampling, Standing, Status,
+    BarrierSettings, Begin, Driver, End, Filter, FilterBuilder, FilterState, Infeasible, Integration, Phase,
+    Plans, SampleDerivative, Sampling, Standing, Status,
 };
 use punctual_core::lie::{Direction, along};
 use punctual_core::plan::Failure;
@@ -73,7 +73,7 @@ impl Vehicle {
     ) -> Result<FilterBuilder, punctual_core::Error> {
         macro_rules! along {
             ($plant:expr) => {{
-                let builder = SafetyFilter::builder(4, 2).barrier("goal", $plant, goal.0, goal.1)?;
+                let builder = Filter::builder(4, 2).barrier("goal", $plant, goal.0, goal.1)?;
                 match clear {
                     Some((clear, settings)) => builder.barrier("clear", $plant, clear, settings),
                     None => Ok(builder),
@@ -86,17 +86,12 @@ impl Vehicle {
         }
     }
 
-    fn filter(self, deadline: f64, bounds: [f64; 2]) -> SafetyFilter {
+    fn filter(self, deadline: f64, bounds: [f64; 2]) -> Filter {
         self.filter_of(deadline, bounds, (true, Sampling::Period(PERIOD)))
     }
 
     /// With the goal, and the obstacle if it `is_beside`.
-    fn filter_of(
-        self,
-        deadline: f64,
-        bounds: [f64; 2],
-        (is_beside, sampling): (bool, Sampling),
-    ) -> SafetyFilter {
+    fn filter_of(self, deadline: f64, bounds: [f64; 2], (is_beside, sampling): (bool, Sampling)) -> Filter {
         let disc = |(centre, radius)| DistanceDisc::new(centre, radius, 1.0).expect("valid disc");
         let (goal, clear) = (disc(GOAL), Outside(disc(OBSTACLE)));
         // Without the obstacle the goal is kept with a rate that is not chosen on the way.
@@ -110,8 +105,8 @@ impl Vehicle {
             .expect("valid filter")
     }
 
-    fn assured(self, deadline: f64, bounds: [f64; 2]) -> AssuredFilter {
-        AssuredFilter::new(self.filter(deadline, bounds), PERIOD).expect("a filter that can be assured")
+    fn assured(self, deadline: f64, bounds: [f64; 2]) -> Filter {
+        self.filter(deadline, bounds).with_plans(PERIOD).expect("a filter that can be assured")
     }
 }
 
@@ -152,7 +147,8 @@ fn what_is_promised_is_kept_whatever_is_wanted() {
             let t = k as f64 * PERIOD;
             let u_ref = wanted(vehicle, seed % 5, x, bounds, random);
             let mut u = [0.0; 2];
-            let assurance = *filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
+            let assurance =
+                filter.step(t, &x, &u_ref, &mut u).expect("right dimensions").assurance.expect("plans");
             if k == 0 {
                 if !assurance.is_assured() {
                     assert!(
@@ -189,7 +185,8 @@ fn what_no_input_can_keep_is_refused() {
     // From rest 12 m/s² lead 17.3 m far along x in 1.7 s, and the goal begins at 18 m.
     let mut filter = Vehicle::PointMass.assured(1.7, [12.0; 2]);
     let mut u = [0.0; 2];
-    let assurance = *filter.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions");
+    let assurance =
+        filter.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions").assurance.expect("plans");
     assert!(assurance.standing == Standing::Refused && assurance.failure.is_some(), "{assurance:?}");
     assert!(filter.plan().is_none());
     // The rows go on.
@@ -203,17 +200,18 @@ fn the_soonest_deadline_is_taken_and_kept() {
     for infeasible in [Infeasible::Report, Infeasible::Soonest] {
         let goal = DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
         let settings = BarrierSettings { infeasible, ..BarrierSettings::within(2.0) };
-        let filter = SafetyFilter::builder(4, 2)
+        let filter = Filter::builder(4, 2)
             .barrier("goal", PointMass, goal, settings)
             .and_then(|b| b.bounds(&[-4.0; 2], &[4.0; 2]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+        let mut filter = filter.with_plans(PERIOD).expect("a filter that can be assured");
         let (mut x, mut u, mut deadline) = ([0.0, 0.0, -1.0, 2.0], [0.0; 2], 0.0);
         for k in 0..400 {
             let t = f64::from(k) * PERIOD;
-            let assurance = *filter.step(t, &x, &[-8.0, 8.0], &mut u).expect("right dimensions");
+            let assurance =
+                filter.step(t, &x, &[-8.0, 8.0], &mut u).expect("right dimensions").assurance.expect("plans");
             if infeasible == Infeasible::Report {
                 assert_eq!(assurance.standing, Standing::Refused);
                 break;
@@ -237,14 +235,18 @@ fn the_soonest_deadline_is_taken_and_kept() {
 fn the_soonest_deadline_is_near_what_physics_allows() {
     let goal = DistanceDisc::new([30.0, 0.0], 1.0, 1.0).expect("valid disc");
     for (deadline, bound) in [(2.0, 2.0), (20.0, 2.0), (5.0, 7.0)] {
-        let filter = SafetyFilter::builder(4, 2)
+        let filter = Filter::builder(4, 2)
             .barrier("goal", PointMass, goal, BarrierSettings::within(deadline))
             .and_then(|b| b.bounds(&[-bound; 2], &[bound; 2]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
-        let (factor, witness) = filter.soonest(0.0, &[0.0; 4], 100.0).expect("there is a deadline");
+        let filter = filter.with_plans(PERIOD).expect("a filter that can be assured");
+        let (factor, witness) = filter
+            .planning()
+            .expect("plans")
+            .earliest_deadline(0.0, &[0.0; 4], 100.0)
+            .expect("there is a deadline");
         // The edge at 29 m, with the speed from which 2 m are enough to stop: half a v² of 2 a d more.
         let (d, room) = (29.0, 2.0);
         let speed = f64::sqrt(bound * (d + room));
@@ -253,8 +255,10 @@ fn the_soonest_deadline_is_near_what_physics_allows() {
         assert!((0.99 * least..1.08 * least).contains(&soonest), "a <= {bound}: {soonest} s, {least} s");
         assert!(witness.effort <= 1.0);
         // As promised, a little later can be assured, and much sooner cannot.
-        assert!(filter.foresee(0.0, &[0.0; 4], 1.1 * factor).is_ok());
-        assert!(filter.foresee(0.0, &[0.0; 4], 0.95 * least / deadline).is_err());
+        assert!(filter.planning().expect("plans").plan_from(0.0, &[0.0; 4], 1.1 * factor).is_ok());
+        assert!(
+            filter.planning().expect("plans").plan_from(0.0, &[0.0; 4], 0.95 * least / deadline).is_err()
+        );
     }
 }
 
@@ -263,12 +267,16 @@ fn a_restored_filter_goes_on_bit_for_bit() {
     let vehicle = Vehicle::Unicycle;
     let mut filter = vehicle.assured(8.0, [6.0, 2.0]);
     let mut x = [0.0, 0.0, -0.4, 1.0];
-    let run = |filter: &mut AssuredFilter, x: &mut [f64; 4], steps: std::ops::Range<usize>| {
+    let run = |filter: &mut Filter, x: &mut [f64; 4], steps: std::ops::Range<usize>| {
         let mut bits = Vec::new();
         for k in steps {
             let mut u = [0.0; 2];
             let u_ref = [6.0, -1.5];
-            let assurance = filter.step(k as f64 * PERIOD, &*x, &u_ref, &mut u).expect("right dimensions");
+            let assurance = filter
+                .step(k as f64 * PERIOD, &*x, &u_ref, &mut u)
+                .expect("right dimensions")
+                .assurance
+                .expect("plans");
             assert!(assurance.is_assured(), "{assurance:?}");
             bits.push(u.map(f64::to_bits));
             *x = vehicle.move_by(*x, u, PERIOD);
@@ -277,13 +285,13 @@ fn a_restored_filter_goes_on_bit_for_bit() {
     };
     run(&mut filter, &mut x, 0..150);
     // To a file and back: the numbers keep their bits.
-    let text = serde_json::to_string(&(filter.filter().state(), filter.commitment())).expect("serialises");
-    let memory: (FilterState, Commitment) = serde_json::from_str(&text).expect("what was written");
-    assert_eq!(memory.1, *filter.commitment());
+    let text = serde_json::to_string(filter.state()).expect("serialises");
+    let memory: FilterState = serde_json::from_str(&text).expect("what was written");
+    assert_eq!(memory, *filter.state());
     let from = x;
     let uninterrupted = run(&mut filter, &mut x, 150..400);
     let mut other = vehicle.assured(8.0, [6.0, 2.0]);
-    other.restore(&memory.0, &memory.1).expect("its own state");
+    other.restore(&memory).expect("its own state");
     let mut x = from;
     assert_eq!(run(&mut other, &mut x, 150..400), uninterrupted);
 }
@@ -299,9 +307,10 @@ fn a_look_is_not_remembered() {
         let u_ref = [6.0, if k % 70 < 35 { 1.5 } else { -1.5 }];
         looking.peek(t, &x, &[0.3, 0.1], &mut seen).expect("right dimensions");
         looking.peek(t, &x, &u_ref, &mut seen).expect("right dimensions");
-        let looked = *looking.assurance();
+        let looked = *looking.assurance().expect("plans");
         looking.step(t, &x, &u_ref, &mut seen).expect("right dimensions");
-        let assurance = *plain.step(t, &x, &u_ref, &mut u).expect("right dimensions");
+        let assurance =
+            plain.step(t, &x, &u_ref, &mut u).expect("right dimensions").assurance.expect("plans");
         assert_eq!((seen.map(f64::to_bits), looked), (u.map(f64::to_bits), assurance), "{t}");
         let report = plain.report();
         // The solver's iterations alone depend on what was looked at before.
@@ -343,7 +352,8 @@ fn steps_of_other_lengths_keep_the_promise_or_end_it() {
             };
             filter.expect_hold(Some(hold)).expect("a time");
             let (u_ref, mut u) = (wanted(vehicle, seed % 5, x, bounds, random), [0.0; 2]);
-            let assurance = *filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
+            let assurance =
+                filter.step(t, &x, &u_ref, &mut u).expect("right dimensions").assurance.expect("plans");
             if !assurance.is_assured() {
                 assert!(
                     seed % 3 != 0 && t > 0.0 && assurance.standing == Standing::Irregular,
@@ -371,18 +381,19 @@ fn steps_of_other_lengths_keep_the_promise_or_end_it() {
 #[test]
 fn what_is_let_go_on_arrival_is_not_promised_after() {
     let disc = DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
-    let filter = SafetyFilter::builder(4, 2)
+    let filter = Filter::builder(4, 2)
         .barrier("goal", PointMass, disc, BarrierSettings::within(8.0))
         .and_then(|b| b.window(Begin::AtOnce, End::OnArrival))
         .and_then(|b| b.bounds(&[-4.0; 2], &[4.0; 2]))
         .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
-    let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+    let mut filter = filter.with_plans(PERIOD).expect("a filter that can be assured");
     let (mut x, mut u, mut released) = ([0.0; 4], [0.0; 2], false);
     for k in 0..500 {
         let t = f64::from(k) * PERIOD;
-        let assurance = *filter.step(t, &x, &[3.0, 1.8], &mut u).expect("right dimensions");
+        let assurance =
+            filter.step(t, &x, &[3.0, 1.8], &mut u).expect("right dimensions").assurance.expect("plans");
         let goal = &filter.report().barriers[0];
         released |= goal.phase == Phase::Released;
         assert!(assurance.is_assured() && goal.guaranteed != released, "{t}: {goal:?}");
@@ -403,7 +414,8 @@ fn tiny_and_huge_steps_are_answered() {
         for hold in [first, 0.02, 1e18, 1e-12] {
             filter.expect_hold(Some(hold)).expect("a time");
             let mut u = [0.0; 2];
-            let assurance = *filter.step(t, &x, &[6.0, 1.0], &mut u).expect("right dimensions");
+            let assurance =
+                filter.step(t, &x, &[6.0, 1.0], &mut u).expect("right dimensions").assurance.expect("plans");
             assert!(u[0].abs() <= 6.0 && u[1].abs() <= 2.0, "{first} s: {assurance:?}");
             assert!(first != 0.02 || t > 0.02 || assurance.is_assured(), "{assurance:?}");
             x = vehicle.move_by(x, u, hold.min(0.02));
@@ -439,10 +451,11 @@ fn judged(seed: u64, random: &mut Random, course: &mut Course<'_>) -> Outcome {
             break;
         }
         let step = (course.step)(random);
-        let told = if course.is_told { step } else { filter.usual_hold(t) };
+        let told = if course.is_told { step } else { filter.usual_hold(t).expect("plans") };
         filter.expect_hold(Some(told)).expect("a time");
         let (u_ref, mut u) = (wanted(vehicle, seed % 5, x, bounds, random), [0.0; 2]);
-        let assurance = *filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
+        let assurance =
+            filter.step(t, &x, &u_ref, &mut u).expect("right dimensions").assurance.expect("plans");
         match assurance.is_assured() {
             true => outcome.assured += 1,
             false => outcome.lost.push((t, assurance.standing, assurance.failure)),
@@ -493,7 +506,7 @@ fn a_controller_that_is_safe_by_itself_is_left_alone() {
         let vehicle = if seed.is_multiple_of(2) { Vehicle::PointMass } else { Vehicle::Unicycle };
         let start = [random.between(-3.0, 3.0), random.between(-9.0, 3.0), 0.5, random.between(0.0, 2.0)];
         let gains = [random.between(0.5, 1.2), random.between(1.2, 2.5), random.between(3.0, 8.0)];
-        let drive = |filter: Option<&mut AssuredFilter>| {
+        let drive = |filter: Option<&mut Filter>| {
             let (mut x, mut arrival, mut nearest, mut changes, mut filter) =
                 (start, None, f64::INFINITY, 0, filter);
             for k in 0..(seconds / PERIOD) as u32 {
@@ -502,7 +515,11 @@ fn a_controller_that_is_safe_by_itself_is_left_alone() {
                 let within = [0, 1].map(|i| u_ref[i].clamp(-bounds[i], bounds[i]));
                 let mut u = within;
                 if let Some(filter) = filter.as_deref_mut() {
-                    let assurance = filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
+                    let assurance = filter
+                        .step(t, &x, &u_ref, &mut u)
+                        .expect("right dimensions")
+                        .assurance
+                        .expect("plans");
                     assert!(assurance.is_assured(), "{seed} at {t}: {assurance:?}");
                 }
                 changes += u32::from(arrival.is_none() && u != within);
@@ -581,7 +598,7 @@ fn a_faster_clock_becomes_the_usual_one() {
     let (mut filter, mut x, mut u) = (Vehicle::PointMass.assured(8.0, [8.0; 2]), [0.0; 4], [0.0; 2]);
     for k in 0..40_u32 {
         let t = f64::from(k) * 0.5 * PERIOD;
-        let hold = filter.usual_hold(t);
+        let hold = filter.usual_hold(t).expect("plans");
         assert!(k > 7 || hold == PERIOD, "{k}: {hold}");
         assert!(k < 10 || (hold - 0.5 * PERIOD).abs() < 1e-9, "{k}: {hold}");
         filter.expect_hold(Some(hold)).expect("a time");
@@ -629,19 +646,20 @@ fn the_cost_of_a_step_does_not_grow_as_it_gets_shorter() {
     }
     let asked = |hold: f64, first: bool| {
         let goal = DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
-        let filter = SafetyFilter::builder(4, 2)
+        let filter = Filter::builder(4, 2)
             .barrier("goal", Counted, goal, BarrierSettings::within(8.0))
             .and_then(|b| b.bounds(&[-6.0, -2.5], &[6.0, 2.5]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+        let mut filter = filter.with_plans(PERIOD).expect("a filter that can be assured");
         let (mut x, mut u, mut t, mut most) = ([0.0, 0.0, -0.4, 1.0], [0.0; 2], 0.0, 0);
         for k in 0..30 {
             let hold = if k < 10 && !first { PERIOD } else { hold };
             filter.expect_hold(Some(hold)).expect("a time");
             ASKED.store(0, Ordering::Relaxed);
-            let assurance = *filter.step(t, &x, &[6.0, 1.0], &mut u).expect("right dimensions");
+            let assurance =
+                filter.step(t, &x, &[6.0, 1.0], &mut u).expect("right dimensions").assurance.expect("plans");
             assert!(assurance.is_assured(), "{hold} s at {t}: {assurance:?}");
             if k > 10 || first && k == 0 {
                 most = most.max(ASKED.load(Ordering::Relaxed));
@@ -665,8 +683,13 @@ fn the_cost_of_a_step_does_not_grow_as_it_gets_shorter() {
 #[test]
 fn a_plan_of_another_period_ends_as_irregular() {
     let (mut seen, vehicle) = (0, Vehicle::Unicycle);
-    let soonest =
-        vehicle.assured(6.0, [6.0, 2.0]).soonest(0.0, &[0.0, 0.0, -0.4, 1.0], 1.0).expect("a plan").0;
+    let soonest = vehicle
+        .assured(6.0, [6.0, 2.0])
+        .planning()
+        .expect("plans")
+        .earliest_deadline(0.0, &[0.0, 0.0, -0.4, 1.0], 1.0)
+        .expect("a plan")
+        .0;
     for seed in 1..=48_u64 {
         // A few samples are enough.
         if seen >= 5 {
@@ -688,13 +711,17 @@ fn a_plan_of_another_period_ends_as_irregular() {
             }
             x = vehicle.move_by(x, u, hold);
             t += hold;
-            if step > change + 1 && format!("{:?}", filter.commitment()).contains("is_even: false") {
+            if step > change + 1 && format!("{:?}", filter.state().plan).contains("is_even: false") {
                 seen += 1;
                 let lost = |x: &[f64]| {
                     let mut copy = vehicle.assured(deadline, [6.0, 2.0]);
-                    copy.restore(filter.filter().state(), filter.commitment()).expect("its own");
+                    copy.restore(filter.state()).expect("its own");
                     copy.expect_hold(Some(other)).expect("a time");
-                    copy.step(t, x, &[0.0; 2], &mut [0.0; 2]).expect("right dimensions").standing
+                    copy.step(t, x, &[0.0; 2], &mut [0.0; 2])
+                        .expect("right dimensions")
+                        .assurance
+                        .expect("plans")
+                        .standing
                 };
                 assert_eq!(lost(&[-400.0, 0.0, 0.0, 0.0]), Standing::Irregular);
                 // Its input changes within this hold.
@@ -717,10 +744,10 @@ fn small_sets_are_promised_from_far_away() {
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
-        filter.foresee(0.0, &[0.0; 4], 1.0)
+        let filter = filter.with_plans(PERIOD).expect("a filter that can be assured");
+        filter.planning().expect("plans").plan_from(0.0, &[0.0; 4], 1.0)
     };
-    let builder = || SafetyFilter::builder(4, 2);
+    let builder = || Filter::builder(4, 2);
     let small = far(builder().barrier("goal", PointMass, quadratic, BarrierSettings::within(12.0)));
     assert!(small.is_ok(), "{small:?}");
     let distant = far(builder().barrier("goal", PointMass, disc, BarrierSettings::within(60.0)));
@@ -736,17 +763,18 @@ fn a_vehicle_at_the_edge_comes_to_rest_there() {
     for margin in [0.02, 0.0] {
         let disc = DistanceDisc::new([0.0; 2], 2.0, 1.0).expect("valid disc");
         let settings = BarrierSettings { margin, ..BarrierSettings::keeping() };
-        let filter = SafetyFilter::builder(4, 2)
+        let filter = Filter::builder(4, 2)
             .barrier("room", PointMass, disc, settings)
             .and_then(|b| b.bounds(&[-4.0; 2], &[4.0; 2]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+        let mut filter = filter.with_plans(PERIOD).expect("a filter that can be assured");
         let (mut x, mut last, mut jump) = ([0.0; 4], [0.0; 2], 0.0_f64);
         for k in 0..3000 {
             let (t, mut u) = (f64::from(k) * PERIOD, [0.0; 2]);
-            let assurance = *filter.step(t, &x, &[2.0, 0.0], &mut u).expect("right dimensions");
+            let assurance =
+                filter.step(t, &x, &[2.0, 0.0], &mut u).expect("right dimensions").assurance.expect("plans");
             let holds = filter.plan().map_or(0, |plan| plan.inputs.len());
             assert!(assurance.is_assured() && holds < 300, "{t}: {assurance:?}, {holds} holds");
             x = Vehicle::PointMass.move_by(x, u, PERIOD);
@@ -773,17 +801,21 @@ fn a_wall_is_promised_at_every_period() {
         let (bound, speed) = (random.between(2.0, 20.0), random.between(0.5, 8.0));
         let room = speed * speed / (2.0 * bound) * random.between(1.3, 10.0) + 2.0 * speed * period;
         let wall = StateBound::at_most(0, room).expect("valid bound");
-        let filter = SafetyFilter::builder(4, 2)
+        let filter = Filter::builder(4, 2)
             .barrier("wall", PointMass, wall, BarrierSettings::keeping())
             .and_then(|b| b.bounds(&[-bound; 2], &[bound; 2]))
             .and_then(|b| b.sampling(Sampling::Period(period)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, period).expect("a filter that can be assured");
+        let mut filter = filter.with_plans(period).expect("a filter that can be assured");
         let mut x = [0.0, 0.0, speed, 0.0];
         for k in 0..(4.0 * room / speed / period).min(3000.0) as u32 {
             let (t, mut u) = (f64::from(k) * period, [0.0; 2]);
-            let assurance = *filter.step(t, &x, &[bound, 0.0], &mut u).expect("right dimensions");
+            let assurance = filter
+                .step(t, &x, &[bound, 0.0], &mut u)
+                .expect("right dimensions")
+                .assurance
+                .expect("plans");
             assert!(assurance.is_assured(), "{seed}, period {period}, at {t}: {assurance:?}");
             for _ in 0..4 {
                 x = Vehicle::PointMass.move_by(x, u, period / 4.0);
@@ -812,12 +844,17 @@ fn a_sample_at_another_time_ends_the_promise() {
         if wrong > 1.0 {
             x = Vehicle::PointMass.move_by(x, u, PERIOD * (wrong - 1.0));
         }
-        let other = filter.step(late, &x, &[0.0; 2], &mut u).expect("right dimensions");
+        let other =
+            filter.step(late, &x, &[0.0; 2], &mut u).expect("right dimensions").assurance.expect("plans");
         assert_eq!(other.standing, Standing::Irregular, "{t}");
         // In time again: the same promise, from where the plant has come to.
         if wrong > 1.0 {
             x = Vehicle::PointMass.move_by(x, u, PERIOD);
-            let again = filter.step(late + PERIOD, &x, &[0.0; 2], &mut u).expect("right dimensions");
+            let again = filter
+                .step(late + PERIOD, &x, &[0.0; 2], &mut u)
+                .expect("right dimensions")
+                .assurance
+                .expect("plans");
             assert!(again.is_assured(), "{t}: {again:?}");
             for k in 2..400 {
                 x = Vehicle::PointMass.move_by(x, u, PERIOD);
@@ -832,8 +869,13 @@ fn a_sample_at_another_time_ends_the_promise() {
 /// What was broken while no plan was followed is not promised again.
 #[test]
 fn what_was_missed_is_not_taken_up_again() {
-    let step = |filter: &mut AssuredFilter, t: f64, x: [f64; 4]| {
-        filter.step(t, &x, &[0.0; 2], &mut [0.0; 2]).expect("right dimensions").standing
+    let step = |filter: &mut Filter, t: f64, x: [f64; 4]| {
+        filter
+            .step(t, &x, &[0.0; 2], &mut [0.0; 2])
+            .expect("right dimensions")
+            .assurance
+            .expect("plans")
+            .standing
     };
     let begun = || {
         let mut filter = Vehicle::PointMass.assured(8.0, [8.0; 2]);
@@ -874,7 +916,8 @@ fn a_lost_promise_is_taken_up_again() {
             let is_away = (60..66).contains(&k);
             let seen: &[f64] = if is_away { &gone[usize::from(hits)] } else { &x };
             let wish = wanted(vehicle, u64::from(k) / 40 % 5, x, bounds, &mut random);
-            let assurance = *filter.step(t, seen, &wish, &mut u).expect("right dimensions");
+            let assurance =
+                filter.step(t, seen, &wish, &mut u).expect("right dimensions").assurance.expect("plans");
             let [flag, backed] =
                 [filter.report().barriers[0].guaranteed, filter.report().status == Status::Backup];
             assert_eq!(flag, assurance.is_assured(), "{run} {t}");
@@ -931,7 +974,12 @@ fn gusts_lose_promises_but_do_not_make_them_lie() {
                 x[3] += size * random.between(-1.0, 1.0);
             }
             let wish = wanted(vehicle, u64::from(k) / 35 % 5, x, bounds, random);
-            let now = filter.step(t, &x, &wish, &mut u).expect("right dimensions").standing;
+            let now = filter
+                .step(t, &x, &wish, &mut u)
+                .expect("right dimensions")
+                .assurance
+                .expect("plans")
+                .standing;
             assert_eq!(filter.report().barriers[0].guaranteed, now == Standing::Assured, "{seed} {t}");
             match (before, now) {
                 (Standing::Undecided, Standing::Assured) => told[0] += 1,
@@ -977,7 +1025,7 @@ fn derivatives_are_those_of_the_piece_in_force() {
         let bounds = [4.0, if run % 2 == 0 { 2.0 } else { 4.0 }];
         let sampling = if run < 4 { Sampling::Pointwise } else { Sampling::Period(PERIOD) };
         let filter = vehicle.filter_of(9.0, bounds, (false, sampling));
-        let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+        let mut filter = filter.with_plans(PERIOD).expect("a filter that can be assured");
         let (mut x, mut u) = ([0.0, 0.0, random.between(-0.3, 0.6), 0.0], [0.0; 2]);
         let mut derivative = SampleDerivative::default();
         for k in 0..800 {
@@ -1002,7 +1050,12 @@ fn derivatives_are_those_of_the_piece_in_force() {
                         core::array::from_fn(|i| u_ref[i] + by * du_ref[i]),
                     );
                     let mut u = [0.0; 2];
-                    let driver = filter.peek(t, &x, &u_ref, &mut u).expect("right dimensions").driver;
+                    let driver = filter
+                        .peek(t, &x, &u_ref, &mut u)
+                        .expect("right dimensions")
+                        .assurance
+                        .expect("plans")
+                        .driver;
                     (driver, [u[0], u[1], filter.report().barriers[0].slack])
                 };
                 let [(before, low), (driver, here), (after, high)] = [-STEP, 0.0, STEP].map(&mut look);
@@ -1049,7 +1102,8 @@ fn a_plan_goes_on_without_a_measurement() {
         let t = f64::from(k) * PERIOD;
         let seen = if k > 20 && k % 50 != 0 { [f64::NAN; 4] } else { x };
         let wish = if k % 3 == 0 { [f64::NAN; 2] } else { [6.0, -1.0] };
-        let assurance = filter.step(t, &seen, &wish, &mut u).expect("right dimensions");
+        let assurance =
+            filter.step(t, &seen, &wish, &mut u).expect("right dimensions").assurance.expect("plans");
         assert!(assurance.is_assured(), "{t}: {assurance:?}");
         x = vehicle.move_by(x, u, PERIOD);
         let distance = |c: [f64; 2]| (x[0] - c[0]).hypot(x[1] - c[1]);
@@ -1063,7 +1117,11 @@ fn a_plant_that_is_not_the_model_ends_the_promise() {
     let mut u = [0.0; 2];
     assert!(filter.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions").is_assured());
     // Somebody has carried it away.
-    let away = filter.step(PERIOD, &[-40.0, -40.0, 0.0, 0.0], &[0.0; 2], &mut u).expect("right dimensions");
+    let away = filter
+        .step(PERIOD, &[-40.0, -40.0, 0.0, 0.0], &[0.0; 2], &mut u)
+        .expect("right dimensions")
+        .assurance
+        .expect("plans");
     assert!(away.standing == Standing::Withdrawn && away.failure.is_some(), "{away:?}");
 }
 
@@ -1071,10 +1129,9 @@ fn a_plant_that_is_not_the_model_ends_the_promise() {
 fn filters_that_plans_do_not_account_for_are_refused() {
     let disc = || DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
     let refused = |settings: BarrierSettings, change: fn(FilterBuilder) -> FilterBuilder| {
-        let builder =
-            SafetyFilter::builder(4, 2).barrier("goal", PointMass, disc(), settings).expect("valid");
+        let builder = Filter::builder(4, 2).barrier("goal", PointMass, disc(), settings).expect("valid");
         let filter = change(builder).build().expect("valid filter");
-        AssuredFilter::new(filter, PERIOD).err().map(|error| error.to_string()).unwrap_or_default()
+        filter.with_plans(PERIOD).err().map(|error| error.to_string()).unwrap_or_default()
     };
     let within = BarrierSettings::within(5.0);
     let delayed = refused(within, |b| b.actuation_delay(0.01).expect("a delay"));
@@ -1092,11 +1149,11 @@ fn filters_that_plans_do_not_account_for_are_refused() {
     assert_eq!(refused(within, |b| b), "");
     let moving =
         QuadraticDisc::new(GOAL.0, GOAL.1).expect("valid disc").moving([1.0, 0.0]).expect("a velocity");
-    let filter = SafetyFilter::builder(4, 2)
+    let filter = Filter::builder(4, 2)
         .barrier("goal", PointMass, moving, within)
         .and_then(FilterBuilder::build)
         .expect("valid filter");
-    let moves = AssuredFilter::new(filter, PERIOD).err().map(|error| error.to_string());
+    let moves = filter.with_plans(PERIOD).err().map(|error| error.to_string());
     assert_eq!(
         moves.as_deref(),
         Some("goal.source: moves with time, so that no plan ends; with a horizon one may end before")
@@ -1131,7 +1188,7 @@ fn obstacles_that_move_are_kept_away_from() {
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+        let mut filter = filter.with_plans(PERIOD).expect("a filter that can be assured");
         let (mut x, mut u) = ([0.0, 0.0, random.between(-0.5, 0.5), random.between(0.0, 1.0)], [0.0; 2]);
         for k in 0..900 {
             let t = f64::from(k) * PERIOD;
@@ -1141,7 +1198,8 @@ fn obstacles_that_move_are_kept_away_from() {
                 (true, Vehicle::Unicycle) => [bounds[0], 4.0 * (to[1].atan2(to[0]) - x[2]).sin()],
                 (false, _) => wanted(vehicle, run as u64 % 5, x, bounds, &mut random),
             };
-            let assurance = *filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
+            let assurance =
+                filter.step(t, &x, &u_ref, &mut u).expect("right dimensions").assurance.expect("plans");
             if k == 0 && assurance.standing == Standing::Refused {
                 println!("refused: {run} {:?}", assurance.failure);
                 break;
@@ -1186,7 +1244,7 @@ fn what_begins_later_is_kept_from_then_on() {
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+        let mut filter = filter.with_plans(PERIOD).expect("a filter that can be assured");
         let (mut x, mut u) = ([0.0, 0.0, random.between(-0.5, 0.5), random.between(0.0, 1.0)], [0.0; 2]);
         let away = |x: [f64; 4], c: [f64; 2]| (x[0] - c[0]).hypot(x[1] - c[1]);
         let is_in = away(x, place) < radius;
@@ -1198,7 +1256,8 @@ fn what_begins_later_is_kept_from_then_on() {
                 (true, Vehicle::Unicycle) => [bounds[0], 4.0 * (to[1].atan2(to[0]) - x[2]).sin()],
                 (false, _) => wanted(vehicle, run as u64 % 5, x, bounds, &mut random),
             };
-            let assurance = filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
+            let assurance =
+                filter.step(t, &x, &u_ref, &mut u).expect("right dimensions").assurance.expect("plans");
             if k == 0 && assurance.standing == Standing::Refused {
                 break;
             }
@@ -1226,12 +1285,12 @@ fn what_begins_later_is_kept_from_then_on() {
 #[test]
 fn one_plan_is_of_one_plant() {
     let disc = || DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
-    let filter = SafetyFilter::builder(4, 2)
+    let filter = Filter::builder(4, 2)
         .barrier("goal", PointMass, disc(), BarrierSettings::within(5.0))
         .and_then(|b| b.barrier("also", Unicycle, disc(), BarrierSettings::within(5.0)))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
-    let error = AssuredFilter::new(filter, PERIOD).err().map(|e| e.to_string()).unwrap_or_default();
+    let error = filter.with_plans(PERIOD).err().map(|e| e.to_string()).unwrap_or_default();
     let message = "also.source: moves the state in another way than that of goal; a plan needs one plant for all barriers";
     assert_eq!(error, message);
 }
@@ -1242,7 +1301,7 @@ fn a_plan_does_not_jump_over_an_obstacle() {
     let mut found = 0;
     for (deadline, radius) in [(60.0, 1.0), (40.0, 0.3), (30.0, 0.05)] {
         let disc = |centre, radius, b| DistanceDisc::new(centre, radius, b).expect("valid disc");
-        let filter = SafetyFilter::builder(4, 2)
+        let filter = Filter::builder(4, 2)
             .barrier("goal", PointMass, disc([500.0, 0.0], 3.0, 1.0), BarrierSettings::within(deadline))
             .and_then(|b| {
                 let clear = Outside(disc([251.3, 0.0], radius, radius));
@@ -1252,10 +1311,10 @@ fn a_plan_does_not_jump_over_an_obstacle() {
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+        let filter = filter.with_plans(PERIOD).expect("a filter that can be assured");
         // Headed for its middle; where a plan is found, it goes around.
         let mut x = [0.0, 0.0, 20.0, 0.0];
-        let Ok(witness) = filter.foresee(0.0, &x, 1.0) else { continue };
+        let Ok(witness) = filter.planning().expect("plans").plan_from(0.0, &x, 1.0) else { continue };
         found += 1;
         let (mut t, mut nearest) = (0.0, f64::INFINITY);
         for (end, u) in &witness.inputs {
@@ -1278,17 +1337,21 @@ fn any_time_is_a_time_to_begin() {
     let vehicle = Vehicle::PointMass;
     for (begin, period) in [(1.7e9, 0.005), (-4.1e5, 0.05)] {
         let disc = DistanceDisc::new([6.0, 3.0], 1.0, 1.0).expect("valid disc");
-        let filter = SafetyFilter::builder(4, 2)
+        let filter = Filter::builder(4, 2)
             .barrier("goal", PointMass, disc, BarrierSettings::within(4.0))
             .and_then(|b| b.bounds(&[-5.0; 2], &[5.0; 2]))
             .and_then(|b| b.sampling(Sampling::Period(period)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, period).expect("a filter that can be assured");
+        let mut filter = filter.with_plans(period).expect("a filter that can be assured");
         let (mut x, mut u) = ([0.0, 0.0, -1.0, 0.5], [0.0; 2]);
         for k in 0..(6.0 / period) as usize {
             let t = k as f64 * period;
-            let assurance = filter.step(begin + t, &x, &[-50.0, -50.0], &mut u).expect("right dimensions");
+            let assurance = filter
+                .step(begin + t, &x, &[-50.0, -50.0], &mut u)
+                .expect("right dimensions")
+                .assurance
+                .expect("plans");
             assert!(assurance.is_assured(), "{begin} + {t}: {assurance:?}");
             x = vehicle.move_by(x, u, period);
             let outside = (x[0] - 6.0).hypot(x[1] - 3.0) - 1.0;
@@ -1308,39 +1371,50 @@ fn what_cannot_be_promised_is_not() {
     // Outside without a deadline nothing is promised, so nothing is assured.
     let filter = |settings| {
         let disc = DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
-        let filter = SafetyFilter::builder(4, 2)
+        let filter = Filter::builder(4, 2)
             .barrier("goal", PointMass, disc, settings)
             .and_then(|b| b.bounds(&[-8.0; 2], &[8.0; 2]))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured")
+        filter.with_plans(PERIOD).expect("a filter that can be assured")
     };
     let mut u = [0.0; 2];
     let mut keeping = filter(BarrierSettings::keeping());
-    let assurance = *keeping.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions");
+    let assurance =
+        keeping.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions").assurance.expect("plans");
     assert_eq!((assurance.standing, assurance.failure), (Standing::Refused, Some(Failure::Nothing)));
-    assert!(keeping.promised(0.0, &[0.0; 4]).eq([false]));
-    assert!(keeping.promised(0.0, &[GOAL.0[0], GOAL.0[1], 0.0, 0.0]).eq([true]));
+    assert!(keeping.planning().expect("plans").promised(0.0, &[0.0; 4]).eq([false]));
+    assert!(keeping.planning().expect("plans").promised(0.0, &[GOAL.0[0], GOAL.0[1], 0.0, 0.0]).eq([true]));
     // A search that has no end is ended, with or without something to find.
-    assert_eq!(keeping.soonest(0.0, &[0.0; 4], f64::INFINITY), None);
-    let reached = filter(BarrierSettings::within(1e-3)).soonest(0.0, &[0.0; 4], f64::INFINITY);
+    assert_eq!(keeping.planning().expect("plans").earliest_deadline(0.0, &[0.0; 4], f64::INFINITY), None);
+    let reached = filter(BarrierSettings::within(1e-3)).planning().expect("plans").earliest_deadline(
+        0.0,
+        &[0.0; 4],
+        f64::INFINITY,
+    );
     assert!(reached.is_some_and(|(factor, _)| (2.0e3..2.0e4).contains(&factor)));
-    assert!(filter(BarrierSettings::within(1e30)).foresee(0.0, &[0.0; 4], 1.0).is_err());
+    assert!(
+        filter(BarrierSettings::within(1e30))
+            .planning()
+            .expect("plans")
+            .plan_from(0.0, &[0.0; 4], 1.0)
+            .is_err()
+    );
     // A state of another plant, or with inputs of other bounds, is refused or kept within its own.
     let mut wide = Vehicle::PointMass.assured(8.0, [12.0; 2]);
     wide.step(0.0, &[0.0, 0.0, -3.0, 2.0], &[0.0; 2], &mut u).expect("right dimensions");
-    let (state, commitment) = (wide.filter().state().clone(), wide.commitment().clone());
-    assert!(filter(BarrierSettings::within(5.0)).restore(&state, &commitment).is_err());
+    let state = wide.state().clone();
+    assert!(filter(BarrierSettings::within(5.0)).restore(&state).is_err());
     let mut narrow = Vehicle::PointMass.assured(8.0, [1.0; 2]);
-    narrow.restore(&state, &commitment).expect("as many barriers");
+    narrow.restore(&state).expect("as many barriers");
     for k in 1..200 {
         narrow.step(f64::from(k) * PERIOD, &[f64::NAN; 4], &[0.0; 2], &mut u).expect("right dimensions");
         assert!(u.iter().all(|u| u.abs() <= 1.0), "{u:?}");
     }
     // The report is that of what was restored, or of nothing.
-    assert!(narrow.assurance().is_assured());
+    assert!(narrow.assurance().expect("plans").is_assured());
     narrow.rearm();
-    assert!(!narrow.assurance().is_assured());
+    assert!(!narrow.assurance().expect("plans").is_assured());
 }
 
 /// The paper's vehicle, whose angle is an integral: the plant is given its mean, within its limits and its rate.
@@ -1357,7 +1431,7 @@ fn plans_stand_behind_an_integral_too() {
         let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
         let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0).expect("valid disc");
         let model = SmallSlipBicycle::new(LENGTH).expect("a length").with_rate();
-        let filter = SafetyFilter::builder(5, 2)
+        let filter = Filter::builder(5, 2)
             .barrier(
                 "goal",
                 model,
@@ -1368,10 +1442,10 @@ fn plans_stand_behind_an_integral_too() {
             .and_then(|b| b.sampling(Sampling::Period(period)))
             .and_then(FilterBuilder::build)
             .and_then(|filter| {
-                IntegratedFilter::new(filter, Integration { state: 4, input: 1, limits: LIMITS, gain: 10.0 })
+                filter.with_integrator(Integration { state: 4, input: 1, limits: LIMITS, gain: 10.0 })
             })
             .expect("valid filter");
-        let mut filter = AssuredFilter::integrated(filter, period).expect("a filter that can be assured");
+        let mut filter = filter.with_plans(period).expect("a filter that can be assured");
         let [x, y] = [0, 1].map(|_| random.between(0.0, 90.0));
         let mut x = [x, y, random.between(-3.0, 3.0), random.between(0.0, 20.0)];
         let mut before = 0.0;
@@ -1386,7 +1460,12 @@ fn plans_stand_behind_an_integral_too() {
             // How the mean follows what is wanted of it, not at all beyond its limits.
             let mut look = |by: f64| {
                 let u_ref = [u_ref[0], u_ref[1] + by];
-                let driver = filter.peek(t, &x, &u_ref, &mut u).expect("right dimensions").driver;
+                let driver = filter
+                    .peek(t, &x, &u_ref, &mut u)
+                    .expect("right dimensions")
+                    .assurance
+                    .expect("plans")
+                    .driver;
                 (driver, u[1])
             };
             let [(before_it, low), (driver, here), (after_it, high)] = [-1e-6, 0.0, 1e-6].map(&mut look);
@@ -1403,17 +1482,18 @@ fn plans_stand_behind_an_integral_too() {
                 );
                 compared[usize::from(by == 0.0)] += 1;
             }
-            let assurance = *filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
+            let assurance =
+                filter.step(t, &x, &u_ref, &mut u).expect("right dimensions").assurance.expect("plans");
             if k == 0 && !assurance.is_assured() {
                 break;
             }
             accepted += usize::from(k == 0);
             assert!(assurance.is_assured(), "{seed} at {t}: {assurance:?}");
             // The angle is the mean over the period, of an integral with its limits and its rate.
-            assert!((LIMITS[0]..=LIMITS[1]).contains(&filter.value()), "{}", filter.value());
-            assert!((filter.value() - before).abs() <= 4.0 * period + 1e-12 && u[0].abs() <= 40.0);
-            assert!((u[1] - 0.5 * (before + filter.value())).abs() < 1e-12, "{u:?}");
-            before = filter.value();
+            assert!((LIMITS[0]..=LIMITS[1]).contains(&filter.integrated()), "{}", filter.integrated());
+            assert!((filter.integrated() - before).abs() <= 4.0 * period + 1e-12 && u[0].abs() <= 40.0);
+            assert!((u[1] - 0.5 * (before + filter.integrated())).abs() < 1e-12, "{u:?}");
+            before = filter.integrated();
             for part in 1..=20 {
                 let at = |k: [f64; 4], s: f64| std::array::from_fn(|i| x[i] + s * k[i]);
                 let dt = period / 20.0;
@@ -1437,13 +1517,13 @@ fn a_point_moved_by_its_velocity_is_promised_what_it_can_do() {
     let speed = 5.0;
     let filter = |deadline: f64| {
         let disc = DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
-        let filter = SafetyFilter::builder(2, 2)
+        let filter = Filter::builder(2, 2)
             .barrier("goal", MovedPoint, disc, BarrierSettings::within(deadline))
             .and_then(|b| b.bounds(&[-speed; 2], &[speed; 2]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured")
+        filter.with_plans(PERIOD).expect("a filter that can be assured")
     };
     // Not the origin: there a difference has no round-off.
     let (mut x, mut u) = ([1.0, -3.0], [0.0; 2]);
@@ -1454,7 +1534,11 @@ fn a_point_moved_by_its_velocity_is_promised_what_it_can_do() {
     for k in 0..500 {
         let t = f64::from(k) * PERIOD;
         assert!(t < 5.0 - PERIOD / 2.0 || inside(x), "{x:?} at {t}");
-        let assurance = filter.step(t, &x, &[-speed, -speed], &mut u).expect("right dimensions");
+        let assurance = filter
+            .step(t, &x, &[-speed, -speed], &mut u)
+            .expect("right dimensions")
+            .assurance
+            .expect("plans");
         assert!(assurance.is_assured() && u.iter().all(|u| u.abs() <= speed), "{assurance:?} at {t}");
         x = [0, 1].map(|i| x[i] + PERIOD * u[i]);
     }
@@ -1468,20 +1552,19 @@ fn wall() -> impl Iterator<Item = f64> {
     (-12..=12).map(|k| f64::from(k) * 2.4).filter(|y| (y - 16.8).abs() > 1.3)
 }
 
-fn behind_a_wall() -> AssuredFilter {
+fn behind_a_wall(plans: Plans) -> Filter {
     const BOUND: f64 = 4.0;
     let disc = |(centre, radius)| DistanceDisc::new(centre, radius, 1.0).expect("valid disc");
     let within = BarrierSettings { margin: 0.01, ..BarrierSettings::within(20.0) };
     let keeping = BarrierSettings { margin: 0.01, ..BarrierSettings::keeping() };
-    let mut builder =
-        SafetyFilter::builder(4, 2).barrier("goal", PointMass, disc(BEHIND), within).expect("a goal");
+    let mut builder = Filter::builder(4, 2).barrier("goal", PointMass, disc(BEHIND), within).expect("a goal");
     for (i, y) in wall().enumerate() {
         let clear = Outside(disc(([WALL[0], y], WALL[1])));
         builder = builder.barrier(&format!("wall_{i}"), PointMass, clear, keeping).expect("an obstacle");
     }
     let builder =
         builder.bounds(&[-BOUND; 2], &[BOUND; 2]).and_then(|b| b.sampling(Sampling::Period(PERIOD)));
-    AssuredFilter::new(builder.and_then(FilterBuilder::build).expect("valid"), PERIOD).expect("plans")
+    builder.and_then(FilterBuilder::build).expect("valid").with_plans(plans).expect("plans")
 }
 
 /// To a point before the gap, to one behind it, to the goal: at a moderate speed, damped.
@@ -1504,14 +1587,15 @@ fn is_clear_of_the_wall(x: [f64; 4]) -> bool {
 fn a_policy_shows_the_way_through_a_gap() {
     let start = [0.0; 4];
     assert!(
-        behind_a_wall().foresee(0.0, &start, 1.0).is_err(),
+        behind_a_wall(Plans::every(PERIOD)).planning().expect("plans").plan_from(0.0, &start, 1.0).is_err(),
         "the search finds the gap by itself, so this shows nothing"
     );
-    let mut filter = behind_a_wall().policy(|_, x, u| through_the_gap(x, u));
+    let mut filter = behind_a_wall(Plans::every(PERIOD).policy(|_, x, u| through_the_gap(x, u)));
     let mut x = start;
     for k in 0..(24.0 / PERIOD) as usize {
         let (t, mut u) = (k as f64 * PERIOD, [0.0; 2]);
-        let assurance = *filter.step(t, &x, &[1.0, -1.0], &mut u).expect("right dimensions");
+        let assurance =
+            filter.step(t, &x, &[1.0, -1.0], &mut u).expect("right dimensions").assurance.expect("plans");
         assert!(assurance.is_assured(), "at {t}: {assurance:?}");
         x = Vehicle::PointMass.move_by(x, u, PERIOD);
         assert!(is_clear_of_the_wall(x), "at {t}: {x:?}");
@@ -1528,10 +1612,10 @@ fn armed_again_it_goes_on_with_the_plan_at_hand() {
     let helps = Arc::new(AtomicBool::new(true));
     let made = || {
         let helps = Arc::clone(&helps);
-        behind_a_wall().policy(move |_, x, u| match helps.load(Ordering::Relaxed) {
+        behind_a_wall(Plans::every(PERIOD).policy(move |_, x, u| match helps.load(Ordering::Relaxed) {
             true => through_the_gap(x, u),
             false => u.fill(0.0),
-        })
+        }))
     };
     for unknown in [0, 7] {
         helps.store(true, Ordering::Relaxed);
@@ -1542,17 +1626,25 @@ fn armed_again_it_goes_on_with_the_plan_at_hand() {
             let t = k as f64 * PERIOD;
             if k == again {
                 helps.store(false, Ordering::Relaxed);
-                assert!(behind_a_wall().foresee(t, &x, 1.0).is_err(), "a search finds the gap from {x:?}");
+                assert!(
+                    behind_a_wall(Plans::every(PERIOD))
+                        .planning()
+                        .expect("plans")
+                        .plan_from(t, &x, 1.0)
+                        .is_err(),
+                    "a search finds the gap from {x:?}"
+                );
                 // What it would do were it not armed again.
-                blind.restore(filter.filter().state(), filter.commitment()).expect("a state of its own");
+                blind.restore(filter.state()).expect("a state of its own");
                 filter.rearm();
-                let (state, commitment) = (filter.filter().state().clone(), filter.commitment().clone());
+                let state = filter.state().clone();
                 filter = made();
-                filter.restore(&state, &commitment).expect("a state of its own");
+                filter.restore(&state).expect("a state of its own");
             }
             let is_unknown = (again..again + unknown).contains(&k);
             let seen = if is_unknown { [f64::NAN; 4] } else { x };
-            let assurance = *filter.step(t, &seen, &wish, &mut u).expect("right dimensions");
+            let assurance =
+                filter.step(t, &seen, &wish, &mut u).expect("right dimensions").assurance.expect("plans");
             if is_unknown {
                 let mut other = [0.0; 2];
                 blind.step(t, &seen, &wish, &mut other).expect("right dimensions");
@@ -1579,7 +1671,11 @@ fn armed_again_it_goes_on_with_the_plan_at_hand() {
     for (k, (x, standing)) in (0..).zip(steps) {
         helps.store(k == 0, Ordering::Relaxed);
         filter.rearm();
-        let assurance = *filter.step(f64::from(k) * PERIOD, &x, &[0.0; 2], &mut u).expect("right dimensions");
+        let assurance = filter
+            .step(f64::from(k) * PERIOD, &x, &[0.0; 2], &mut u)
+            .expect("right dimensions")
+            .assurance
+            .expect("plans");
         assert_eq!(assurance.standing, standing, "{k}");
     }
 }
@@ -1596,9 +1692,10 @@ fn armed_again_between_samples_of_another_period_it_follows_the_plan() {
         }
         let is_unknown = (20..26).contains(&k);
         let seen = if is_unknown { [f64::NAN; 4] } else { x };
-        let hold = filter.usual_hold(t);
+        let hold = filter.usual_hold(t).expect("plans");
         filter.expect_hold(Some(hold)).expect("a time");
-        let assurance = *filter.step(t, &seen, &[-3.0, 1.0], &mut u).expect("right dimensions");
+        let assurance =
+            filter.step(t, &seen, &[-3.0, 1.0], &mut u).expect("right dimensions").assurance.expect("plans");
         match is_unknown {
             true => assert_eq!(
                 (assurance.standing, assurance.driver),
@@ -1611,7 +1708,7 @@ fn armed_again_between_samples_of_another_period_it_follows_the_plan() {
     }
     // At another time than was said, samples begin anew.
     filter.rearm();
-    assert_eq!(filter.usual_hold(100.0), PERIOD);
+    assert_eq!(filter.usual_hold(100.0), Some(PERIOD));
 }
 
 /// A tank that runs out at a rate of `self.0` times the root of its level, in m and s.
@@ -1679,13 +1776,13 @@ fn kept<P, const NX: usize>(
     P: ControlAffine<NX, 1> + Copy + Send + core::fmt::Debug + 'static,
 {
     let period = deadline / f64::from(steps);
-    let filter = SafetyFilter::builder(NX, 1)
+    let filter = Filter::builder(NX, 1)
         .barrier("band", plant, band, BarrierSettings::within(deadline))
         .and_then(|b| b.bounds(&[low], &[high]))
         .and_then(|b| b.sampling(Sampling::Period(period)))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
-    let mut filter = AssuredFilter::new(filter, period).expect("plans");
+    let mut filter = filter.with_plans(period).expect("plans");
     let mut x = SVector::from(from);
     for k in 0..2 * steps {
         let (t, mut u) = (f64::from(k) * period, [0.0]);
@@ -1701,7 +1798,11 @@ fn kept<P, const NX: usize>(
                 }
             }
         };
-        let assurance = *filter.step(t, x.as_slice(), &[wanted], &mut u).expect("right dimensions");
+        let assurance = filter
+            .step(t, x.as_slice(), &[wanted], &mut u)
+            .expect("right dimensions")
+            .assurance
+            .expect("plans");
         assert!(
             assurance.is_assured(),
             "{plant:?} from {from:?} to {band:?}, wish {wish}, at {t}: {assurance:?}"
@@ -1820,7 +1921,7 @@ fn no_plan_lets_a_tank_run_dry() {
         let (rate, pump) = (random.between(0.1, 0.4), random.between(0.2, 0.6));
         let (limit, period) = (random.between(0.5, 2.0), random.between(0.1, 2.0));
         let mut x = limit * random.between(0.3, 0.99);
-        let filter = SafetyFilter::builder(1, 1)
+        let filter = Filter::builder(1, 1)
             .barrier(
                 "level",
                 Tank(rate),
@@ -1831,10 +1932,11 @@ fn no_plan_lets_a_tank_run_dry() {
             .and_then(|b| b.sampling(Sampling::Period(period)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, period).expect("plans");
+        let mut filter = filter.with_plans(period).expect("plans");
         for k in 0..300 {
             let (t, mut u) = (f64::from(k) * period, [0.0]);
-            let assurance = *filter.step(t, &[x], &[0.0], &mut u).expect("dimensions");
+            let assurance =
+                filter.step(t, &[x], &[0.0], &mut u).expect("dimensions").assurance.expect("plans");
             assert!(assurance.is_assured(), "{round}, at {t}, {x}: {assurance:?}");
             for _ in 0..200 {
                 // Not-a-number is empty.
@@ -1855,18 +1957,19 @@ fn a_start_at_the_edge_is_not_lost_to_round_off() {
         let (limit, period) = (random.between(0.2, 0.9), 10.0_f64.powf(random.between(-2.0, -0.5)));
         let speed = [0.0, -1e-3, -0.1][round / 6 % 3];
         let edge = StateBound::at_most(0, limit).expect("a bound");
-        let filter = SafetyFilter::builder(4, 2)
+        let filter = Filter::builder(4, 2)
             .barrier("edge", PointMass, edge, BarrierSettings::keeping())
             .and_then(|b| b.bounds(&[-1.0; 2], &[1.0; 2]))
             .and_then(|b| b.sampling(Sampling::Period(period)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, period).expect("plans");
+        let mut filter = filter.with_plans(period).expect("plans");
         let mut x = [limit - inside, 0.0, speed, 0.0];
         for k in 0..200 {
             let wish = if round % 2 == 0 { 1.0 } else { random.between(-1.0, 1.0) };
             let (t, mut u) = (f64::from(k) * period, [0.0; 2]);
-            let assurance = *filter.step(t, &x, &[wish, 0.0], &mut u).expect("dimensions");
+            let assurance =
+                filter.step(t, &x, &[wish, 0.0], &mut u).expect("dimensions").assurance.expect("plans");
             if k == 0 && !assurance.is_assured() {
                 break;
             }
@@ -1889,20 +1992,21 @@ fn leaves_the_edge<const N: usize>(random: &mut Random, draws: usize) -> u32 {
         let (inside, deadline) = ([0.0, 1e-12, 1e-9, 1e-7, 1e-5][round % 5], random.between(3.0, 6.0));
         let place = most * (deadline / 6.0).powi(N as i32);
         let band = Band(place, 0.6 * place);
-        let filter = SafetyFilter::builder(N, 1)
+        let filter = Filter::builder(N, 1)
             .barrier("band", Integrator::<N>, band, BarrierSettings::within(deadline))
             .and_then(|b| b.barrier("edge", Integrator::<N>, NonNegative, BarrierSettings::keeping()))
             .and_then(|b| b.bounds(&[-most], &[most]))
             .and_then(|b| b.sampling(Sampling::Period(period)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, period).expect("plans");
+        let mut filter = filter.with_plans(period).expect("plans");
         let mut x = SVector::<f64, N>::zeros();
         x[0] = inside;
         for k in 0..40 {
             let wish = [0.0, -3.0 * most, random.between(-2.0, 2.0) * most][round % 3];
             let (t, mut u) = (f64::from(k) * period, [0.0]);
-            let assurance = *filter.step(t, x.as_slice(), &[wish], &mut u).expect("dimensions");
+            let assurance =
+                filter.step(t, x.as_slice(), &[wish], &mut u).expect("dimensions").assurance.expect("plans");
             if k == 0 && !assurance.is_assured() {
                 break;
             }
@@ -1937,17 +2041,18 @@ fn at_the_edge_the_input_does_not_chatter() {
     const BOUND: f64 = 5.0;
     // A small set without a margin of its own, and a wish that never lets go.
     let goal = QuadraticDisc::new([5.0, 0.0], 0.2).expect("valid disc");
-    let filter = SafetyFilter::builder(4, 2)
+    let filter = Filter::builder(4, 2)
         .barrier("goal", PointMass, goal, BarrierSettings::within(4.0))
         .and_then(|b| b.bounds(&[-BOUND; 2], &[BOUND; 2]))
         .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
-    let mut filter = AssuredFilter::new(filter, PERIOD).expect("plans");
+    let mut filter = filter.with_plans(PERIOD).expect("plans");
     let (mut x, mut u, mut last, mut moved) = ([0.0, 0.0, -1.0, 0.0], [0.0; 2], [0.0; 2], 0.0);
     for k in 0..(10.0 / PERIOD) as usize {
         let t = k as f64 * PERIOD;
-        let assurance = *filter.step(t, &x, &[3.5, 0.0], &mut u).expect("right dimensions");
+        let assurance =
+            filter.step(t, &x, &[3.5, 0.0], &mut u).expect("right dimensions").assurance.expect("plans");
         assert!(assurance.is_assured(), "at {t}: {assurance:?}");
         if t > 5.0 {
             moved += (u[0] - last[0]).abs();
@@ -1968,17 +2073,21 @@ fn a_hard_turn_is_found() {
     for factor in [1.1, 1.2, 1.35] {
         let deadline = factor * 2.7681;
         let goal = DistanceDisc::new(centre, radius, radius).expect("valid disc");
-        let filter = SafetyFilter::builder(4, 2)
+        let filter = Filter::builder(4, 2)
             .barrier("goal", plant, goal, BarrierSettings::within(deadline))
             .and_then(|b| b.bounds(&[-3.0, -0.5], &[3.0, 0.5]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, PERIOD).expect("plans");
+        let mut filter = filter.with_plans(PERIOD).expect("plans");
         let mut x = SVector::from([0.0, 0.0, -3.0058, 3.4187]);
         for k in 0..((deadline + 1.0) / PERIOD) as usize {
             let (t, mut u) = (k as f64 * PERIOD, [0.0; 2]);
-            let assurance = *filter.step(t, x.as_slice(), &[0.0; 2], &mut u).expect("right dimensions");
+            let assurance = filter
+                .step(t, x.as_slice(), &[0.0; 2], &mut u)
+                .expect("right dimensions")
+                .assurance
+                .expect("plans");
             assert!(assurance.is_assured(), "{factor} at {t}: {assurance:?}");
             for part in 1..=10 {
                 x = rk4_step(&plant, &x, &SVector::from(u), PERIOD / 10.0);
@@ -2001,7 +2110,7 @@ fn on_the_way_the_input_does_not_jump_to_and_fro() {
     let goal = DistanceDisc::new([25.0, 15.0], 2.0, 2.0).expect("valid disc");
     let rock = Outside(DistanceDisc::new([20.0, -1.0], 3.0, 3.0).expect("valid disc"));
     let forwards = StateBound::at_least(3, -0.2).expect("valid bound");
-    let filter = SafetyFilter::builder(4, 2)
+    let filter = Filter::builder(4, 2)
         .barrier("goal", Unicycle, goal, BarrierSettings::within(10.0))
         .and_then(|b| b.barrier("rock", Unicycle, rock, BarrierSettings::keeping()))
         .and_then(|b| b.barrier("forwards", Unicycle, forwards, BarrierSettings::keeping()))
@@ -2009,12 +2118,13 @@ fn on_the_way_the_input_does_not_jump_to_and_fro() {
         .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
-    let mut filter = AssuredFilter::new(filter, PERIOD).expect("plans");
+    let mut filter = filter.with_plans(PERIOD).expect("plans");
     let (mut x, mut u, mut last, mut jumps) = ([0.0, 0.0, -2.0, 3.0], [0.0; 2], [0.0; 2], 0);
     for k in 0..(15.0 / PERIOD) as usize {
         let t = k as f64 * PERIOD;
         let wish = [0.5 * (6.0 - x[3]), 0.2];
-        let assurance = *filter.step(t, &x, &wish, &mut u).expect("right dimensions");
+        let assurance =
+            filter.step(t, &x, &wish, &mut u).expect("right dimensions").assurance.expect("plans");
         assert!(assurance.is_assured(), "at {t}: {assurance:?}");
         jumps += u32::from((u[0] - last[0]).abs() > 0.3);
         last = u;
@@ -2058,16 +2168,16 @@ impl Barrier<4> for Way {
 }
 
 impl Way {
-    fn filter(&self, deadline: f64) -> AssuredFilter {
+    fn filter(&self, deadline: f64) -> Filter {
         let goal = DistanceDisc::new([300.0, 0.0], 3.0, 1.0).expect("valid disc");
-        let filter = SafetyFilter::builder(4, 2)
+        let filter = Filter::builder(4, 2)
             .barrier("goal", PointMass, goal, BarrierSettings::within(deadline))
             .and_then(|b| b.barrier("way", PointMass, self.clone(), BarrierSettings::keeping()))
             .and_then(|b| b.bounds(&[-4.0; 2], &[4.0; 2]))
             .and_then(|b| b.sampling(Sampling::Period(0.05)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        AssuredFilter::new(filter, 0.05).expect("a filter that can be assured")
+        filter.with_plans(0.05).expect("a filter that can be assured")
     }
 }
 
@@ -2078,10 +2188,12 @@ fn a_thin_wall_is_seen_wherever_it_stands() {
         let wall = [random.between(10.0, 280.0), 0.0, random.between(0.1, 2.0)];
         let way = Way { things: vec![wall], kind: Thing::Wall };
         let x = [0.0, 0.0, random.between(0.0, 8.0), 0.0];
-        let assurance = *way
+        let assurance = way
             .filter(random.between(25.0, 40.0))
             .step(0.0, &x, &[0.0; 2], &mut [0.0; 2])
-            .expect("dimensions");
+            .expect("dimensions")
+            .assurance
+            .expect("plans");
         assert_eq!(assurance.standing, Standing::Refused, "{way:?}");
     }
 }
@@ -2102,7 +2214,8 @@ fn small_things_on_a_long_way_are_seen() {
         for k in 0..900 {
             let (mut u, u_ref) = ([0.0; 2], if seed % 4 < 2 { [0.0; 2] } else { [-x[2], -x[3]] });
             let t = 0.05 * f64::from(k);
-            let standing = filter.step(t, &x, &u_ref, &mut u).expect("dimensions").standing;
+            let standing =
+                filter.step(t, &x, &u_ref, &mut u).expect("dimensions").assurance.expect("plans").standing;
             if k == 0 && standing == Standing::Refused {
                 break;
             }
@@ -2151,19 +2264,24 @@ fn a_wind_on_a_short_stretch_is_seen_wherever_it_blows() {
         let plant = Windy([random.between(60.0, 500.0), width, random.between(1.0, 60.0) / width]);
         let goal = StateBound::at_least(0, 550.0).expect("valid bound");
         let deadline = random.between(40.0, 60.0);
-        let filter = SafetyFilter::builder(2, 1)
+        let filter = Filter::builder(2, 1)
             .barrier("goal", plant, goal, BarrierSettings::within(deadline))
             .and_then(|b| b.bounds(&[-0.5], &[0.5]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+        let mut filter = filter.with_plans(PERIOD).expect("a filter that can be assured");
         let mut x = SVector::from([0.0, random.between(8.0, 16.0)]);
         let (mut k, mut refused) = (0, false);
         while PERIOD * f64::from(k) < deadline && !refused {
             let (t, u_ref) = (PERIOD * f64::from(k), [0.0, 0.3, -x[1]][seed as usize % 3]);
             let mut u = [0.0];
-            let standing = filter.step(t, x.as_slice(), &[u_ref], &mut u).expect("dimensions").standing;
+            let standing = filter
+                .step(t, x.as_slice(), &[u_ref], &mut u)
+                .expect("dimensions")
+                .assurance
+                .expect("plans")
+                .standing;
             refused = k == 0 && standing == Standing::Refused;
             assert!(
                 refused || standing == Standing::Assured,
@@ -2209,13 +2327,13 @@ fn jumps_and_powers_of_negative_numbers_are_seen() {
         let exponent = [2.0, 4.0, 6.0, 66.0][round % 4];
         let (odd, edge) = if round < 16 { (Odd::Angle, 0.0) } else { (Odd::Power(exponent), -5.0) };
         let plant = Windy([0.0, 1.0, 0.0]);
-        let filter = SafetyFilter::builder(2, 1)
+        let filter = Filter::builder(2, 1)
             .barrier("odd", plant, odd, BarrierSettings::keeping())
             .and_then(|b| b.bounds(&[-1.0], &[1.0]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+        let mut filter = filter.with_plans(PERIOD).expect("a filter that can be assured");
         let mut x = [edge + random.between(0.1, 1.0), -random.between(0.1, 1.2)];
         if round < 6 {
             // From here the jump was between the instants that are looked at.
@@ -2223,7 +2341,8 @@ fn jumps_and_powers_of_negative_numbers_are_seen() {
         }
         for k in 0..40 {
             let (t, u_ref, mut u) = (PERIOD * f64::from(k), [0.0, -1.0, -x[1]][round % 3], [0.0]);
-            let standing = filter.step(t, &x, &[u_ref], &mut u).expect("dimensions").standing;
+            let standing =
+                filter.step(t, &x, &[u_ref], &mut u).expect("dimensions").assurance.expect("plans").standing;
             if k == 0 && standing == Standing::Refused {
                 break;
             }
@@ -2263,19 +2382,24 @@ fn small_things_are_seen_far_from_the_origin() {
         let plant = Lifted(far + 1.2345);
         let ceiling = StateBound::at_most(1, far + 0.003).expect("valid bound");
         let goal = StateBound::at_least(0, far + 2.5).expect("valid bound");
-        let filter = SafetyFilter::builder(2, 2)
+        let filter = Filter::builder(2, 2)
             .source("ceiling", along(plant, ceiling, 1).expect("a degree"), BarrierSettings::keeping())
             .and_then(|b| b.barrier("goal", plant, goal, BarrierSettings::within(4.0)))
             .and_then(|b| b.bounds(&[-1.0, -0.01], &[1.0, 0.01]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+        let mut filter = filter.with_plans(PERIOD).expect("a filter that can be assured");
         let mut x = SVector::from([far, far]);
         for k in 0..50 {
             let (t, mut u) = (PERIOD * f64::from(k), [0.0; 2]);
             let u_ref = [[0.0; 2], [1.0, 0.01]][round % 2];
-            let standing = filter.step(t, x.as_slice(), &u_ref, &mut u).expect("dimensions").standing;
+            let standing = filter
+                .step(t, x.as_slice(), &u_ref, &mut u)
+                .expect("dimensions")
+                .assurance
+                .expect("plans")
+                .standing;
             if standing == Standing::Refused {
                 break;
             }
@@ -2301,14 +2425,18 @@ fn a_deadline_beside_a_sample_is_looked_at() {
         let deadline = 2.0 + 1e-6 * PERIOD + beside;
         // From rest 20 m are all that 10 m/s² allow until then.
         let goal = StateBound::at_least(0, 20.5).expect("valid bound");
-        let filter = SafetyFilter::builder(4, 2)
+        let filter = Filter::builder(4, 2)
             .barrier("goal", PointMass, goal, BarrierSettings::within(deadline))
             .and_then(|b| b.bounds(&[-10.0; 2], &[10.0; 2]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
-        let assurance = *filter.step(0.0, &[0.0; 4], &[0.0; 2], &mut [0.0; 2]).expect("dimensions");
+        let mut filter = filter.with_plans(PERIOD).expect("a filter that can be assured");
+        let assurance = filter
+            .step(0.0, &[0.0; 4], &[0.0; 2], &mut [0.0; 2])
+            .expect("dimensions")
+            .assurance
+            .expect("plans");
         assert_eq!(assurance.standing, Standing::Refused, "{deadline}");
     }
 }
@@ -2319,7 +2447,7 @@ fn a_deadline_beside_a_sample_is_looked_at() {
 fn what_has_ended_is_not_guaranteed() {
     let fence = StateBound::at_most(0, 5.0).expect("valid bound");
     let goal = StateBound::at_least(0, 9.0).expect("valid bound");
-    let filter = SafetyFilter::builder(4, 2)
+    let filter = Filter::builder(4, 2)
         .barrier("fence", PointMass, fence, BarrierSettings::keeping())
         .and_then(|b| b.window(Begin::AtOnce, End::At(3.0)))
         .and_then(|b| b.barrier("goal", PointMass, goal, BarrierSettings::within(3.9)))
@@ -2327,7 +2455,7 @@ fn what_has_ended_is_not_guaranteed() {
         .and_then(|b| b.sampling(Sampling::Period(0.1)))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
-    let mut filter = AssuredFilter::new(filter, 0.1).expect("a filter that can be assured");
+    let mut filter = filter.with_plans(0.1).expect("a filter that can be assured");
     let (mut x, mut guaranteed) = ([0.0_f64; 4], 0);
     for k in 0..45 {
         let (mut u, wanted) = ([0.0; 2], if k < 10 { f64::NAN } else { 6.0 });
@@ -2347,20 +2475,24 @@ fn what_has_ended_is_not_guaranteed() {
 fn armed_again_when_all_is_over_it_follows_no_plan() {
     for (samples, driver) in [(5, Driver::Plan), (12, Driver::Rows)] {
         let fence = StateBound::at_most(0, 5.0).expect("valid bound");
-        let filter = SafetyFilter::builder(4, 2)
+        let filter = Filter::builder(4, 2)
             .barrier("fence", PointMass, fence, BarrierSettings::keeping())
             .and_then(|b| b.window(Begin::AtOnce, End::At(1.0)))
             .and_then(|b| b.bounds(&[-6.0; 2], &[6.0; 2]))
             .and_then(|b| b.sampling(Sampling::Period(0.1)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, 0.1).expect("a filter that can be assured");
+        let mut filter = filter.with_plans(0.1).expect("a filter that can be assured");
         let (at, mut u) = (|k: u32| f64::from(k) * 0.1, [0.0; 2]);
         for k in 0..samples {
             filter.step(at(k), &[0.0; 4], &[0.0; 2], &mut u).expect("dimensions");
         }
         filter.rearm();
-        let blind = *filter.step(at(samples), &[f64::NAN; 4], &[0.0; 2], &mut u).expect("dimensions");
+        let blind = filter
+            .step(at(samples), &[f64::NAN; 4], &[0.0; 2], &mut u)
+            .expect("dimensions")
+            .assurance
+            .expect("plans");
         assert_eq!((blind.standing, blind.driver), (Standing::Undecided, driver), "after {samples}");
     }
 }
@@ -2380,19 +2512,19 @@ impl ControlAffine<2, 1> for Filling {
 }
 
 /// Keeps the level of `plant`, its second state, below `limit`.
-fn level_kept<P, const NX: usize>(plant: P, limit: f64) -> AssuredFilter
+fn level_kept<P, const NX: usize>(plant: P, limit: f64) -> Filter
 where
     P: ControlAffine<NX, 1> + Send + 'static,
 {
     let level = StateBound::at_most(1, limit).expect("valid bound");
     let source = along(plant, level, 2).expect("a degree");
-    let filter = SafetyFilter::builder(NX, 1)
+    let filter = Filter::builder(NX, 1)
         .source("level", source, BarrierSettings::keeping())
         .and_then(|b| b.bounds(&[-2.0], &[2.0]))
         .and_then(|b| b.sampling(Sampling::Period(0.1)))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
-    AssuredFilter::new(filter, 0.1).expect("a filter that can be assured")
+    filter.with_plans(0.1).expect("a filter that can be assured")
 }
 
 /// What goes on to creep, however slowly, is no rest: no promise is given that is lost later. Without a creep there are some.
@@ -2413,7 +2545,12 @@ fn what_creeps_on_is_no_rest() {
         let mut filter = level_kept(plant, limit);
         for k in 0..1300 {
             let (t, u_ref, mut u) = (0.1 * f64::from(k), [0.0, 2.0, -x[0]][round % 3], [0.0]);
-            let standing = filter.step(t, x.as_slice(), &[u_ref], &mut u).expect("dimensions").standing;
+            let standing = filter
+                .step(t, x.as_slice(), &[u_ref], &mut u)
+                .expect("dimensions")
+                .assurance
+                .expect("plans")
+                .standing;
             if k == 0 && standing == Standing::Refused {
                 break;
             }
@@ -2470,7 +2607,12 @@ fn a_rest_that_decays_slowly_stays_one() {
         let mut filter = level_kept(plant, limit);
         for k in 0..4000 {
             let (t, u_ref, mut u) = (0.1 * f64::from(k), [0.0, 2.0, -x[0]][round % 3], [0.0]);
-            let standing = filter.step(t, x.as_slice(), &[u_ref], &mut u).expect("dimensions").standing;
+            let standing = filter
+                .step(t, x.as_slice(), &[u_ref], &mut u)
+                .expect("dimensions")
+                .assurance
+                .expect("plans")
+                .standing;
             if k == 0 && standing == Standing::Refused {
                 break;
             }
@@ -2560,17 +2702,22 @@ fn an_unstable_rest_is_none() {
         let leads_out = round % 3 > 0;
         let rate = 10.0_f64.powf(random.between(-3.0, 0.5)) * if leads_out { 1.0 } else { -1.0 };
         let plant = Unstable { rate };
-        let filter = SafetyFilter::builder(4, 1)
+        let filter = Filter::builder(4, 1)
             .barrier("near", plant, Near, BarrierSettings::within(8.0))
             .and_then(|b| b.bounds(&[-2.0], &[2.0]))
             .and_then(|b| b.sampling(Sampling::Period(0.05)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, 0.05).expect("a filter that can be assured");
+        let mut filter = filter.with_plans(0.05).expect("a filter that can be assured");
         // On the way that leads to 0, but for very little.
         let beside = if round % 2 == 0 { 0.0 } else { 10.0_f64.powf(random.between(-14.0, -7.0)) };
         let start = [0.0, 0.0, 0.5, -0.5 / (5.0 + rate) + beside];
-        let standing = filter.step(0.0, &start, &[0.0], &mut [0.0]).expect("dimensions").standing;
+        let standing = filter
+            .step(0.0, &start, &[0.0], &mut [0.0])
+            .expect("dimensions")
+            .assurance
+            .expect("plans")
+            .standing;
         assert_eq!(standing == Standing::Assured, !leads_out, "{plant:?} from {start:?}: {standing:?}");
     }
 }
@@ -2610,20 +2757,24 @@ fn what_round_off_would_lose_is_not_followed() {
         let (stiffness, most) = (random.between(20.0, 40.0), random.between(1.0, 3.0));
         let brink = most / stiffness;
         let set = Within(brink * random.between(1.2, 2.0));
-        let filter = SafetyFilter::builder(2, 1)
+        let filter = Filter::builder(2, 1)
             .barrier("near", Driven { stiffness }, set, BarrierSettings::keeping())
             .and_then(|b| b.bounds(&[-most], &[most]))
             .and_then(|b| b.sampling(Sampling::Period(STEP)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, STEP).expect("a filter that can be assured");
+        let mut filter = filter.with_plans(STEP).expect("a filter that can be assured");
         let (lambda, mut u) = (stiffness.sqrt(), [0.0]);
         let (cosh, sinh) = ((lambda * STEP).cosh(), (lambda * STEP).sinh());
         let mut x = [brink * random.between(-0.7, 0.7), 0.0];
         let wanted = [0.0, -1e3, 1e3, 0.5 * most][round % 4];
         for k in 0..250 {
-            let standing =
-                filter.step(f64::from(k) * STEP, &x, &[wanted], &mut u).expect("dimensions").standing;
+            let standing = filter
+                .step(f64::from(k) * STEP, &x, &[wanted], &mut u)
+                .expect("dimensions")
+                .assurance
+                .expect("plans")
+                .standing;
             assert_eq!(standing, Standing::Assured, "round {round}, step {k}, {x:?}");
             let from = x[0] + u[0] / stiffness;
             x = [from * cosh + x[1] / lambda * sinh - u[0] / stiffness, from * lambda * sinh + x[1] * cosh];
@@ -2657,18 +2808,19 @@ fn a_lag_far_shorter_than_a_hold_is_promised() {
         let step = random.between(0.01, 0.2);
         let lag = step / 10.0_f64.powf(random.between(-0.5, 2.0));
         let (set, most) = (Within(random.between(0.5, 1.5)), random.between(1.0, 3.0));
-        let filter = SafetyFilter::builder(2, 1)
+        let filter = Filter::builder(2, 1)
             .barrier("near", Lagging { lag }, set, BarrierSettings::within(3.0))
             .and_then(|b| b.bounds(&[-most], &[most]))
             .and_then(|b| b.sampling(Sampling::Period(step)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, step).expect("a filter that can be assured");
+        let mut filter = filter.with_plans(step).expect("a filter that can be assured");
         let (mut x, mut u) = ([set.0 + random.between(-1.0, 0.5) * most, 0.0], [0.0]);
         let wanted = [0.0, -1e3, 1e3, 0.7 * most][round % 4];
         for k in 0..100 {
             let t = f64::from(k) * step;
-            let standing = filter.step(t, &x, &[wanted], &mut u).expect("dimensions").standing;
+            let standing =
+                filter.step(t, &x, &[wanted], &mut u).expect("dimensions").assurance.expect("plans").standing;
             assert_eq!(standing, Standing::Assured, "round {round}, step {k}: lag {lag}, {step} s, {x:?}");
             let after = |dt: f64| {
                 let gone = -(-dt / lag).exp_m1();
@@ -2696,10 +2848,12 @@ fn a_place_far_from_the_origin_is_no_other_place() {
                 .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
                 .and_then(FilterBuilder::build)
                 .expect("valid filter");
-            let mut filter = AssuredFilter::new(filter, PERIOD).expect("a filter that can be assured");
+            let mut filter = filter.with_plans(PERIOD).expect("a filter that can be assured");
             let standing = filter
                 .step(0.0, &[far, far, 1.0, 0.0], &[0.0; 2], &mut [0.0; 2])
                 .expect("dimensions")
+                .assurance
+                .expect("plans")
                 .standing;
             assert_eq!(standing, Standing::Assured, "{vehicle:?} at {far}");
         }
@@ -2726,15 +2880,20 @@ fn what_creeps_on_unseen_is_no_rest() {
         if !leads_out && plant.towards > lost - 0.1 {
             continue;
         }
-        let filter = SafetyFilter::builder(3, 1)
+        let filter = Filter::builder(3, 1)
             .barrier("cool", plant, cool, BarrierSettings::within(8.0))
             .and_then(|b| b.bounds(&[-2.0], &[2.0]))
             .and_then(|b| b.sampling(Sampling::Period(0.05)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, 0.05).expect("a filter that can be assured");
+        let mut filter = filter.with_plans(0.05).expect("a filter that can be assured");
         let start = [0.0, 0.0, -(10.0_f64.powf(random.between(0.0, 3.0)))];
-        let standing = filter.step(0.0, &start, &[0.0], &mut [0.0]).expect("dimensions").standing;
+        let standing = filter
+            .step(0.0, &start, &[0.0], &mut [0.0])
+            .expect("dimensions")
+            .assurance
+            .expect("plans")
+            .standing;
         let is_assured = standing == Standing::Assured;
         assert!(!(leads_out && is_assured), "{plant:?} from {start:?}, {cool:?}");
         // What is still fast beside the way before is no rest either.

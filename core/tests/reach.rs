@@ -5,7 +5,7 @@ mod draw;
 
 use punctual_core::barriers::{DistanceDisc, HalfPlane, Rectangle};
 use punctual_core::dynamics::{ControlAffine, chain, rk4_step};
-use punctual_core::filter::{BarrierSettings, FilterBuilder, Infeasible, Phase, ProfileKind, SafetyFilter};
+use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Infeasible, Phase, ProfileKind};
 use punctual_core::nalgebra::{SMatrix, SVector};
 use punctual_core::qp::Bounds;
 use punctual_core::scalar::Scalar;
@@ -124,9 +124,9 @@ fn no_bounded_run_arrives_before_the_soonest_time() {
     never_earlier(KinematicBicycle::new(1.0, 1.0).expect("valid"), [2.0, 0.1], 5);
 }
 
-fn filter(settings: BarrierSettings, limit: f64) -> SafetyFilter {
+fn filter(settings: BarrierSettings, limit: f64) -> Filter {
     let half = HalfPlane::new([1.0, 0.0], [9.0, 0.0]).expect("valid");
-    SafetyFilter::builder(4, 2)
+    Filter::builder(4, 2)
         .barrier("goal", PointMass, half, settings)
         .and_then(|b| b.bounds(&[-limit; 2], &[limit; 2]))
         .and_then(FilterBuilder::build)
@@ -225,14 +225,14 @@ fn what_a_disturbance_may_do_is_not_ruled_out() {
     for disturbance in [0.0, 60.0] {
         let settings = BarrierSettings { disturbance, ..BarrierSettings::within(1.0) };
         let line = HalfPlane::new([1.0, 0.0], [20.0, 0.0]).expect("a valid barrier");
-        let mut filter = SafetyFilter::builder(4, 2)
+        let mut filter = Filter::builder(4, 2)
             .barrier("line", PointMass, line, settings)
             .and_then(|b| b.bounds(&[-4.0; 2], &[4.0; 2]))
             .and_then(FilterBuilder::build)
             .expect("a valid filter");
         let known = disturbance == 0.0;
         assert_eq!(filter.is_ruled_out(0, 0.0, &start, 1.0).expect("valid"), known);
-        assert_eq!(filter.soonest(0, 0.0, &start, 9.0).expect("valid").is_some(), known);
+        assert_eq!(filter.earliest_arrival(0, 0.0, &start, 9.0).expect("valid").is_some(), known);
         let report = filter.step(0.0, &start, &[0.0; 2], &mut [0.0; 2]).expect("valid");
         assert_eq!(report.barriers[0].deadline_unreachable, known);
     }

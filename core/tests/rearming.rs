@@ -6,7 +6,7 @@ mod scenario;
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::convergence::{FixedTime, FixedTimeState};
 use punctual_core::dynamics::rk4_step;
-use punctual_core::filter::{BarrierSettings, FilterBuilder, Method, Phase, SafetyFilter, Sampling};
+use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Method, Phase, Sampling};
 use punctual_core::lie;
 use punctual_core::nalgebra::{SVector, vector};
 use punctual_reference::plants::Unicycle;
@@ -108,9 +108,7 @@ fn a_deadline_in_the_past_is_late_at_once() {
 /// barrier arrives at the first sample after it, whatever its relative degree, and stays.
 fn short_deadline<const N: usize>(step: f64, deadline: f64) {
     let mut filter = lie::along(Integrator::<N>, NonNegative, N)
-        .and_then(|source| {
-            SafetyFilter::builder(N, 1).source("line", source, BarrierSettings::within(deadline))
-        })
+        .and_then(|source| Filter::builder(N, 1).source("line", source, BarrierSettings::within(deadline)))
         .and_then(|b| b.sampling(Sampling::Period(step)))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
@@ -153,7 +151,7 @@ fn a_deadline_shorter_than_a_step_is_met_as_soon_as_samples_allow() {
 #[test]
 fn a_start_inside() {
     for (x0, at_once) in [([1.0, -1.0], true), ([1.0, -40.0], false)] {
-        let mut filter = SafetyFilter::builder(2, 1)
+        let mut filter = Filter::builder(2, 1)
             .barrier("line", Integrator::<2>, NonNegative, BarrierSettings::within(4.0))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
@@ -243,7 +241,7 @@ fn a_moved_set_on_the_way() {
 #[test]
 fn a_method_that_fails_at_the_anchor_is_reported() {
     let settings = BarrierSettings { method: Method::RepeatedRoot, ..BarrierSettings::within(4.0) };
-    let mut filter = SafetyFilter::builder(3, 1)
+    let mut filter = Filter::builder(3, 1)
         .barrier("line", Integrator::<3>, NonNegative, settings)
         .and_then(FilterBuilder::build)
         .expect("valid filter");
@@ -265,7 +263,7 @@ fn jacobi(step: f64, x0: [f64; 4]) -> (Option<f64>, f64, usize) {
         margin: 0.02,
         ..BarrierSettings::within(5.0)
     };
-    let mut filter = SafetyFilter::builder(4, 2)
+    let mut filter = Filter::builder(4, 2)
         .barrier("goal", Unicycle, distance_disc(), settings)
         .and_then(|b| b.sampling(Sampling::Period(step)))
         .and_then(|b| b.actuation_delay(step))
@@ -308,7 +306,7 @@ fn a_delay_of_one_step_is_compensated() {
 /// h is of now, the rest of the time at which the input acts; the deadline counts from the first sample.
 #[test]
 fn a_delayed_report_names_its_times() {
-    let mut filter = SafetyFilter::builder(2, 1)
+    let mut filter = Filter::builder(2, 1)
         .source(
             "line",
             lie::along(Integrator::<2>, NonNegative, 2).expect("in range"),
@@ -328,7 +326,7 @@ fn a_delayed_report_names_its_times() {
 
 #[test]
 fn a_delay_is_checked() {
-    let builder = || SafetyFilter::builder(4, 2);
+    let builder = || Filter::builder(4, 2);
     let settings = BarrierSettings::within(4.0);
     for value in [-0.1, f64::NAN, f64::INFINITY] {
         let refused = builder().actuation_delay(value).err().expect("refused");

@@ -9,7 +9,7 @@ use punctual_core::barriers::{DistanceDisc, Outside, StateBound};
 use punctual_core::convergence::comparison::binomial;
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::elementary::powf;
-use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter, Sampling, Status};
+use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Sampling, Status};
 use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives};
 use punctual_core::nalgebra::{SMatrix, SVector, vector};
 use punctual_core::scalar::Scalar;
@@ -33,11 +33,11 @@ fn settings() -> BarrierSettings {
     }
 }
 
-fn filter<P>(plant: P, sampling: Sampling) -> SafetyFilter
+fn filter<P>(plant: P, sampling: Sampling) -> Filter
 where
     P: ControlAffine<4, 2> + Send + 'static,
 {
-    SafetyFilter::builder(4, 2)
+    Filter::builder(4, 2)
         .barrier("goal", plant, distance_disc(), settings())
         .and_then(|b| b.sampling(sampling))
         .and_then(FilterBuilder::build)
@@ -149,7 +149,7 @@ fn psi_never_falls_faster<const N: usize>(period: f64) {
         ..BarrierSettings::within(4.0)
     };
     let mut filter = lie::along(Integrator::<N>, NonNegative, N)
-        .and_then(|source| SafetyFilter::builder(N, 1).source("line", source, settings))
+        .and_then(|source| Filter::builder(N, 1).source("line", source, settings))
         .and_then(|b| b.sampling(Sampling::Period(period)))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
@@ -324,7 +324,7 @@ fn the_period_is_measured() {
 #[test]
 fn a_period_must_be_positive() {
     for value in [0.0, -0.01, f64::NAN, f64::INFINITY] {
-        let refused = SafetyFilter::builder(4, 2).sampling(Sampling::Period(value)).err().expect("refused");
+        let refused = Filter::builder(4, 2).sampling(Sampling::Period(value)).err().expect("refused");
         assert_eq!(refused.to_string(), format!("sampling_period: is {value}, must be finite and > 0"));
     }
 }
@@ -333,7 +333,7 @@ fn a_period_must_be_positive() {
 #[test]
 fn without_a_prediction_the_constraint_is_pointwise() {
     let blind = Reduced::blind(lie::along(PointMass, distance_disc(), 2).expect("in range"));
-    let mut blind = SafetyFilter::builder(4, 2)
+    let mut blind = Filter::builder(4, 2)
         .source("goal", Box::new(blind), settings())
         .and_then(|b| b.sampling(Sampling::Period(0.05)))
         .and_then(FilterBuilder::build)
@@ -342,7 +342,7 @@ fn without_a_prediction_the_constraint_is_pointwise() {
     let margin =
         blind.peek(0.0, &first, &[0.0; 2], &mut [0.0; 2]).expect("right dimensions").barriers[0].margin;
     assert!(margin > settings().margin);
-    let mut pointwise = SafetyFilter::builder(4, 2)
+    let mut pointwise = Filter::builder(4, 2)
         .barrier("goal", PointMass, distance_disc(), BarrierSettings { margin, ..settings() })
         .and_then(|b| b.sampling(Sampling::Pointwise))
         .and_then(FilterBuilder::build)
@@ -363,7 +363,7 @@ fn the_margin_follows_the_measured_period() {
     let mut known = filter(PointMass, Sampling::Measured { first: Some(0.02) });
     let mut measured = filter(PointMass, Sampling::Measured { first: Some(0.0001) });
     let mut u = [0.0; 2];
-    let mut margin = |filter: &mut SafetyFilter, t: f64| {
+    let mut margin = |filter: &mut Filter, t: f64| {
         let report = filter.step(t, &[2.0 * t, 0.0, 2.0, 0.0], &[0.0; 2], &mut u).expect("right dimensions");
         report.barriers[0].margin
     };
@@ -418,7 +418,7 @@ proptest! {
     ) {
         let high = if bounded { [60.0, 20.0] } else { [f64::INFINITY; 2] };
         let sampling = if measured { Sampling::Measured { first: None } } else { Sampling::Period(0.05) };
-        let mut filter = SafetyFilter::builder(4, 2)
+        let mut filter = Filter::builder(4, 2)
             .barrier("goal", Unicycle, distance_disc(), settings())
             .and_then(|b| b.bounds(&high.map(|v| -v), &high))
             .and_then(|b| b.sampling(sampling))
@@ -441,7 +441,7 @@ fn every_answer_is_optimal() {
     const SEARCH: f64 = 1e-8;
     for (sampling, tolerance) in [(Sampling::Pointwise, 1e-13), (Sampling::Period(0.01), SEARCH)] {
         let obstacle = Outside(DistanceDisc::new([24.0, 23.0], 4.0, 4.0).expect("valid disc"));
-        let mut filter = SafetyFilter::builder(4, 2)
+        let mut filter = Filter::builder(4, 2)
             .barrier("goal", PointMass, distance_disc(), settings())
             .and_then(|b| b.barrier("obstacle", PointMass, obstacle, settings()))
             .and_then(|b| b.bounds(&[-60.0; 2], &[60.0; 2])?.sampling(sampling))
@@ -482,7 +482,7 @@ fn what_is_on_course_stands_a_disturbance_between_samples() {
             margin: 0.05 * part(11),
             ..BarrierSettings::within(deadline)
         };
-        let mut filter = SafetyFilter::builder(1, 1)
+        let mut filter = Filter::builder(1, 1)
             .barrier("goal", Integrator::<1>, NonNegative, settings)
             .and_then(|b| b.sampling(Sampling::Period(period)))
             .and_then(FilterBuilder::build)
@@ -526,7 +526,7 @@ fn ditches_crossed<const N: usize>(source: impl Fn(Ditch) -> Box<dyn DerivativeS
         let (period, speed) = (0.01 + 0.09 * part(31), 4.0 + 16.0 * part(45));
         let at = 20.0 * period * speed + 3.0 * part(59);
         let width = period * speed * 0.05 * powf(0.02, part(71));
-        let mut filter = SafetyFilter::builder(N, 1)
+        let mut filter = Filter::builder(N, 1)
             .source("ditch", source(Ditch { at, width }), BarrierSettings::keeping())
             .and_then(|b| b.sampling(Sampling::Period(period)))
             .and_then(FilterBuilder::build)
@@ -591,7 +591,7 @@ fn what_is_on_course_is_not_blown_into_a_wall() {
         let gust = Gust { strength: 10.0 * part(97) * speed * speed / width, at, width };
         let wall = way * (1.1 + 3.0 * part(313));
         let plant = Gust { ..gust };
-        let mut filter = SafetyFilter::builder(2, 1)
+        let mut filter = Filter::builder(2, 1)
             .barrier("wall", gust, StateBound::at_most(0, wall).expect("valid"), BarrierSettings::keeping())
             .and_then(|b| b.sampling(Sampling::Period(period)))
             .and_then(FilterBuilder::build)
@@ -652,7 +652,7 @@ fn what_a_gust_leaves_at_the_end_of_a_hold_is_looked_at() {
         let (hold, h, speed) = (0.02 + 0.5 * part(29), 0.1 + 3.0 * part(131), part(57) - 0.5);
         let gust = Gusty { strength: 20.0 * part(211) * h / (hold * hold), hold };
         let strength = gust.strength;
-        let mut filter = SafetyFilter::builder(3, 1)
+        let mut filter = Filter::builder(3, 1)
             .barrier("wall", gust, Wall, BarrierSettings::keeping())
             .and_then(|b| b.sampling(Sampling::Period(hold)))
             .and_then(FilterBuilder::build)

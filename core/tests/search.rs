@@ -15,7 +15,7 @@ use punctual_core::barriers::{DistanceDisc, Outside, QuadraticDisc};
 use punctual_core::convergence::FixedTime;
 use punctual_core::convergence::sampled::PeriodBound;
 use punctual_core::dynamics::{ControlAffine, rk4_step};
-use punctual_core::filter::{BarrierSettings, FilterBuilder, Phase, SafetyFilter, Sampling, Status};
+use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Phase, Sampling, Status};
 use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives};
 use punctual_core::nalgebra::{SMatrix, SVector};
 use punctual_core::qp::Solver;
@@ -227,13 +227,13 @@ const BOUNDS: [&str; 3] = ["none", "loose", "tight"];
 const PERIODS: [f64; 5] = [0.001, 0.003, 0.01, 0.03, 0.1];
 
 /// A filter and its rows' promises and sources.
-type Built = (SafetyFilter, Vec<(FixedTime, Box<dyn DerivativeSource>)>);
+type Built = (Filter, Vec<(FixedTime, Box<dyn DerivativeSource>)>);
 
 fn build<P>(plant: P, sets: &[(Set, BarrierSettings)], bound: Option<[f64; 2]>, period: f64) -> Built
 where
     P: ControlAffine<4, 2> + Copy + Send + 'static,
 {
-    let mut builder = SafetyFilter::builder(4, 2).sampling(Sampling::Period(period)).expect("valid period");
+    let mut builder = Filter::builder(4, 2).sampling(Sampling::Period(period)).expect("valid period");
     let mut promises: Vec<(FixedTime, Box<dyn DerivativeSource>)> = Vec::new();
     for (i, (set, settings)) in sets.iter().enumerate() {
         builder = builder.barrier(&format!("set {i}"), plant, *set, *settings).expect("valid barrier");
@@ -410,7 +410,7 @@ fn round_off_at_the_boundary_is_no_violation() {
     for period in [0.001, 0.003, 0.01, 0.03, 0.1] {
         for (margin, start) in [(0.0, 0.0), (0.0, 9.0), (0.02, 3.3)] {
             let settings = BarrierSettings { margin, ..BarrierSettings::within(2.0) };
-            let mut filter = SafetyFilter::builder(1, 1)
+            let mut filter = Filter::builder(1, 1)
                 .barrier("line", Line, Below, settings)
                 .and_then(|b| b.sampling(Sampling::Period(period)))
                 .and_then(FilterBuilder::build)
@@ -494,7 +494,7 @@ fn a_step_taken_again_gives_the_same_input() {
         }
         let disc = DistanceDisc::new(centre, 2.0, 2.0).expect("valid disc");
         let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(random.between(3.0, 12.0)) };
-        let mut filter = SafetyFilter::builder(4, 2)
+        let mut filter = Filter::builder(4, 2)
             .barrier("goal", Unicycle, disc, settings)
             .and_then(|b| b.sampling(Sampling::Measured { first: Some(STEP) }))
             .and_then(FilterBuilder::build)
@@ -557,7 +557,7 @@ fn a_kept_bend_only_shortens_the_search() {
             let begins = state.bends[1].is_some();
             state.bends = [None; 2];
             without.restore(&state).expect("as many barriers");
-            let step = |filter: &mut SafetyFilter| {
+            let step = |filter: &mut Filter| {
                 let mut u = [0.0; 2];
                 let report = filter.step(t, x_now.as_slice(), &u_ref, &mut u).expect("right dimensions");
                 (report.status, u)

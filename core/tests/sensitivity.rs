@@ -9,7 +9,7 @@ use punctual_core::convergence::stay::Means;
 use punctual_core::convergence::{FixedTime, FixedTimeState};
 use punctual_core::dynamics::{ControlAffine, WithPoint};
 use punctual_core::filter::{
-    BarrierSettings, FilterBuilder, Infeasible, Method, NoDerivative, Phase, ProfileKind, SafetyFilter,
+    BarrierSettings, Filter, FilterBuilder, Infeasible, Method, NoDerivative, Phase, ProfileKind,
     SampleDerivative, Sampling, Status, Strictness,
 };
 use punctual_core::lie::{DerivativeSource, Derivatives, Direction};
@@ -35,7 +35,7 @@ struct Sample {
 }
 
 /// The numbers compared: u, then five per barrier.
-fn outputs(filter: &mut SafetyFilter, sample: &Sample) -> (Status, Vec<Phase>, Vec<f64>) {
+fn outputs(filter: &mut Filter, sample: &Sample) -> (Status, Vec<Phase>, Vec<f64>) {
     let mut values = vec![0.0; sample.u_ref.len()];
     let report = filter.peek(sample.t, &sample.x, &sample.u_ref, &mut values).expect("right lengths");
     let phases = report.barriers.iter().map(|b| b.phase).collect();
@@ -47,7 +47,7 @@ fn outputs(filter: &mut SafetyFilter, sample: &Sample) -> (Status, Vec<Phase>, V
 }
 
 /// The derivative along `direction` of state and reference, laid out as [`outputs`].
-fn derivative(filter: &mut SafetyFilter, at: &Sample, direction: &Sample) -> Result<Vec<f64>, NoDerivative> {
+fn derivative(filter: &mut Filter, at: &Sample, direction: &Sample) -> Result<Vec<f64>, NoDerivative> {
     let mut out = SampleDerivative::default();
     let unknown = filter
         .differentiate(at.t, &at.x, &at.u_ref, Direction { x: &direction.x, u: &direction.u_ref }, &mut out)
@@ -68,7 +68,7 @@ enum Compared {
 }
 
 /// Compares at `at` along `direction`.
-fn compare(filter: &mut SafetyFilter, at: &Sample, direction: &Sample) -> Compared {
+fn compare(filter: &mut Filter, at: &Sample, direction: &Sample) -> Compared {
     let moved = |by: f64| {
         let along = |v: &[f64], d: &[f64]| v.iter().zip(d).map(|(v, d)| v + by * d).collect();
         Sample { t: at.t, x: along(&at.x, &direction.x), u_ref: along(&at.u_ref, &direction.u_ref) }
@@ -112,7 +112,7 @@ enum Form {
 
 const FORMS: [Form; 4] = [Form::Pointwise, Form::Measured, Form::Period, Form::Delayed];
 
-fn formed(builder: FilterBuilder, form: Form) -> SafetyFilter {
+fn formed(builder: FilterBuilder, form: Form) -> Filter {
     match form {
         Form::Pointwise => builder.sampling(Sampling::Pointwise),
         Form::Measured => builder.sampling(Sampling::Measured { first: None }),
@@ -128,12 +128,12 @@ fn goal() -> DistanceDisc {
 }
 
 /// A goal, an obstacle on the way and a speed limit, with bounds.
-fn vehicle<P>(plant: P, speed: StateBound, form: Form) -> SafetyFilter
+fn vehicle<P>(plant: P, speed: StateBound, form: Form) -> Filter
 where
     P: ControlAffine<4, 2> + Copy + Send + 'static,
 {
     let obstacle = Outside(DistanceDisc::new([6.0, 3.0], 1.0, 0.5).expect("valid disc"));
-    let builder = SafetyFilter::builder(4, 2)
+    let builder = Filter::builder(4, 2)
         .barrier("goal", plant, goal(), BarrierSettings::within(5.0))
         .and_then(|b| b.barrier("clear", plant, obstacle, BarrierSettings::within(2.0)))
         .and_then(|b| b.barrier("speed", plant, speed, BarrierSettings::within(1.0)))
@@ -143,12 +143,12 @@ where
 }
 
 /// A goal and a wall, for the bicycles that have their steering as a state.
-fn walled<P>(plant: P, form: Form) -> SafetyFilter
+fn walled<P>(plant: P, form: Form) -> Filter
 where
     P: ControlAffine<5, 2> + Copy + Send + 'static,
 {
     let wall = HalfPlane::new([-1.0, 0.2], [14.0, 0.0]).expect("valid half-plane");
-    let builder = SafetyFilter::builder(5, 2)
+    let builder = Filter::builder(5, 2)
         .barrier("goal", plant, goal(), BarrierSettings::within(5.0))
         .and_then(|b| b.barrier("wall", plant, wall, BarrierSettings::within(2.0)))
         .and_then(|b| b.bounds(&[-6.0, -4.0], &[6.0, 4.0]))
@@ -157,14 +157,13 @@ where
 }
 
 /// One barrier by each method, without bounds; `RepeatedRoot` and profiles start from the anchor.
-fn by_method(settings: BarrierSettings, form: Form) -> SafetyFilter {
-    let builder =
-        SafetyFilter::builder(4, 2).barrier("goal", Unicycle, goal(), settings).expect("valid barrier");
+fn by_method(settings: BarrierSettings, form: Form) -> Filter {
+    let builder = Filter::builder(4, 2).barrier("goal", Unicycle, goal(), settings).expect("valid barrier");
     formed(builder, form)
 }
 
 /// The filters that are tried, by number; the number of states and what u_ref is about.
-fn filters(which: usize, form: Form) -> (SafetyFilter, usize) {
+fn filters(which: usize, form: Form) -> (Filter, usize) {
     let speed = || StateBound::at_most(3, 4.0).expect("valid bound");
     let soft = |b: FilterBuilder| b.strictness(Strictness::Soft(1.5)).expect("valid strictness");
     match which {
@@ -175,7 +174,7 @@ fn filters(which: usize, form: Form) -> (SafetyFilter, usize) {
         4 => (walled(SmallSlipBicycle::new(2.0).expect("valid").with_rate(), form), 5),
         5 => {
             let follow = Outside(goal().following(4));
-            let builder = SafetyFilter::builder(8, 2)
+            let builder = Filter::builder(8, 2)
                 .barrier::<_, _, 8, 2>(
                     "clear",
                     WithPoint::<_, 4>(Unicycle),
@@ -186,7 +185,7 @@ fn filters(which: usize, form: Form) -> (SafetyFilter, usize) {
             (formed(builder, form), 8)
         }
         6 => {
-            let builder = SafetyFilter::builder(4, 2)
+            let builder = Filter::builder(4, 2)
                 .barrier("goal", PointMass, goal(), BarrierSettings::within(5.0))
                 .map(soft)
                 .and_then(|b| {
@@ -213,7 +212,7 @@ fn filters(which: usize, form: Form) -> (SafetyFilter, usize) {
         ),
         9 => {
             let method = Method::FirstOrder(Exponent::default());
-            let builder = SafetyFilter::builder(4, 2)
+            let builder = Filter::builder(4, 2)
                 .barrier(
                     "speed",
                     PointMass,
@@ -228,7 +227,7 @@ fn filters(which: usize, form: Form) -> (SafetyFilter, usize) {
             let settings =
                 BarrierSettings { margin: 0.3, recovery: Some(2.0), ..BarrierSettings::within(5.0) };
             let builder =
-                SafetyFilter::builder(4, 2).barrier("goal", Unicycle, quadratic, settings).expect("valid");
+                Filter::builder(4, 2).barrier("goal", Unicycle, quadratic, settings).expect("valid");
             (formed(builder, form), 4)
         }
         _ => unreachable!("eleven filters"),
@@ -333,7 +332,7 @@ impl DerivativeSource for Mute {
 
 #[test]
 fn what_is_not_known_is_said() {
-    let mut filter = SafetyFilter::builder(1, 1)
+    let mut filter = Filter::builder(1, 1)
         .source("mute", Box::new(Mute), BarrierSettings::within(1.0))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
@@ -357,7 +356,7 @@ fn what_is_not_known_is_said() {
 #[test]
 fn a_later_deadline_is_held() {
     let with = |deadline: f64, infeasible| {
-        SafetyFilter::builder(4, 2)
+        Filter::builder(4, 2)
             .barrier(
                 "goal",
                 PointMass,
@@ -370,7 +369,7 @@ fn a_later_deadline_is_held() {
     };
     let (x, dx) = ([0.0, 0.0, 0.1, 0.2], [0.3, -0.7, 0.5, 1.0]);
     let direction = Direction { x: &dx, u: &[1.0, 0.5] };
-    let differentiate = |mut filter: SafetyFilter| {
+    let differentiate = |mut filter: Filter| {
         let mut out = SampleDerivative::default();
         let unknown = filter.differentiate(0.0, &x, &[0.0; 2], direction, &mut out).expect("lengths");
         assert_eq!(unknown, None);

@@ -8,7 +8,7 @@ use punctual_core::convergence::operator::Operator;
 use punctual_core::convergence::{FixedTimeState, Phase, Unmet};
 use punctual_core::dynamics::rk4_step;
 use punctual_core::filter::{
-    BarrierSettings, Begin, Bend, End, FilterBuilder, FilterState, Integration, Method, Report, SafetyFilter,
+    BarrierSettings, Begin, Bend, End, Filter, FilterBuilder, FilterState, Integration, Method, Report,
     SampleDerivative, Sampling, Strictness,
 };
 use punctual_core::lie::Direction;
@@ -31,8 +31,8 @@ fn back<T: DeserializeOwned>(text: &str) -> T {
 }
 
 /// A goal with a deadline, and a set without one: its deadline is infinite.
-fn filter() -> SafetyFilter {
-    SafetyFilter::builder(4, 2)
+fn filter() -> Filter {
+    Filter::builder(4, 2)
         .barrier("goal", Unicycle, distance_disc(), BarrierSettings::within(12.0))
         .and_then(|b| b.barrier("room", Unicycle, quadratic_disc(), BarrierSettings::keeping()))
         .and_then(|b| b.bounds(&BOUNDS.map(|b| -b), &BOUNDS))
@@ -42,7 +42,7 @@ fn filter() -> SafetyFilter {
 }
 
 /// What each of `count` steps from sample number `from` says, and the input, by their bits.
-fn run(filter: &mut SafetyFilter, x: &mut [f64; 4], from: usize, count: usize) -> Vec<String> {
+fn run(filter: &mut Filter, x: &mut [f64; 4], from: usize, count: usize) -> Vec<String> {
     (from..from + count)
         .map(|k| {
             let mut u = [0.0; 2];
@@ -188,7 +188,7 @@ proptest! {
         input in prop::array::uniform32(number()),
         bends in prop::array::uniform2(prop::option::of(bend())),
     ) {
-        let state = FilterState { barriers, time, period, input, start, bends };
+        let state = FilterState { barriers, time, period, input, start, bends, ..Default::default() };
         let text = json(&state);
         prop_assert_eq!(json(&back::<FilterState>(&text)), text);
         let mut filter = filter();

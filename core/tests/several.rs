@@ -4,7 +4,7 @@ mod scenario;
 
 use punctual_core::barriers::{DistanceDisc, HalfPlane, NormBound, Outside, StateBound};
 use punctual_core::dynamics::rk4_step;
-use punctual_core::filter::{BarrierSettings, Begin, End, FilterBuilder, Phase, SafetyFilter, Status};
+use punctual_core::filter::{BarrierSettings, Begin, End, Filter, FilterBuilder, Phase, Status};
 use punctual_core::nalgebra::SVector;
 use punctual_reference::plants::PointMass;
 
@@ -13,12 +13,7 @@ fn disc(x: f64, y: f64) -> DistanceDisc {
 }
 
 /// Runs with damping at 100 Hz until `end`; `check` sees time, state and the filter after each step.
-fn run(
-    filter: &mut SafetyFilter,
-    x0: [f64; 4],
-    end: f64,
-    mut check: impl FnMut(f64, &SVector<f64, 4>, &SafetyFilter),
-) {
+fn run(filter: &mut Filter, x0: [f64; 4], end: f64, mut check: impl FnMut(f64, &SVector<f64, 4>, &Filter)) {
     let (mut x, mut u, step) = (SVector::from(x0), SVector::<f64, 2>::zeros(), 0.01);
     for k in 0..=(end / step).round() as u32 {
         let t = f64::from(k) * step;
@@ -35,7 +30,7 @@ fn one_after_the_other() {
     let by_arrival = [(Begin::AtOnce, End::OnArrival), (Begin::AfterArrival(0), End::Never)];
     let by_clock = [(Begin::AtOnce, End::At(5.0)), (Begin::At(5.0), End::Never)];
     for windows in [by_arrival, by_clock] {
-        let mut filter = SafetyFilter::builder(4, 2)
+        let mut filter = Filter::builder(4, 2)
             .barrier("A", PointMass, disc(20.0, 0.0), BarrierSettings::within(5.0))
             .and_then(|b| b.window(windows[0].0, windows[0].1))
             .and_then(|b| b.barrier("B", PointMass, disc(-10.0, 15.0), BarrierSettings::within(10.0)))
@@ -73,7 +68,7 @@ fn a_corridor_obstacles_and_a_speed_limit() {
     let keep = BarrierSettings { margin: 0.01, ..BarrierSettings::within(5.0) };
     let rock = |x, y, r| Outside(DistanceDisc::new([x, y], r, r).expect("valid disc"));
     let wall = |ny, y| HalfPlane::new([0.0, ny], [0.0, y]).expect("valid wall");
-    let mut filter = SafetyFilter::builder(4, 2)
+    let mut filter = Filter::builder(4, 2)
         .barrier("goal", PointMass, disc(30.0, 0.5), BarrierSettings::within(8.0))
         .and_then(|b| b.barrier("floor", PointMass, wall(1.0, -2.0), keep))
         .and_then(|b| b.barrier("ceiling", PointMass, wall(-1.0, 3.0), keep))
@@ -100,7 +95,7 @@ fn a_corridor_obstacles_and_a_speed_limit() {
 #[test]
 fn a_deadlock_is_reported() {
     let rock = Outside(DistanceDisc::new([10.0, 0.0], 3.0, 3.0).expect("valid disc"));
-    let mut filter = SafetyFilter::builder(4, 2)
+    let mut filter = Filter::builder(4, 2)
         .barrier("goal", PointMass, disc(20.0, 0.0), BarrierSettings::within(6.0))
         .and_then(|b| b.barrier("rock", PointMass, rock, BarrierSettings::within(6.0)))
         .and_then(|b| b.bounds(&[-4.0, -4.0], &[4.0, 4.0]))
@@ -124,7 +119,7 @@ fn a_deadlock_is_reported() {
 
 #[test]
 fn windows_are_checked() {
-    let builder = || SafetyFilter::builder(4, 2);
+    let builder = || Filter::builder(4, 2);
     let with = || builder().barrier("goal", PointMass, disc(5.0, 0.0), BarrierSettings::within(4.0));
     let refused = |b: Result<FilterBuilder, punctual_core::Error>| b.err().expect("refused").to_string();
     let window = |begin, end| refused(with().and_then(|b| b.window(begin, end)));
@@ -149,7 +144,7 @@ fn windows_are_checked() {
 /// A barrier that waits, or has been released, asks for nothing at the end of the longest step either.
 #[test]
 fn a_window_and_a_longest_step() {
-    let mut filter = SafetyFilter::builder(4, 2)
+    let mut filter = Filter::builder(4, 2)
         .barrier("A", PointMass, disc(5.0, 0.0), BarrierSettings::within(3.0))
         .and_then(|b| b.window(Begin::AtOnce, End::OnArrival))
         .and_then(|b| b.barrier("B", PointMass, disc(-5.0, 0.0), BarrierSettings::within(6.0)))

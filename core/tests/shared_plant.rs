@@ -8,7 +8,7 @@ mod support;
 use draw::Draw;
 use punctual_core::barriers::{DistanceDisc, Outside, StateBound};
 use punctual_core::dynamics::{ControlAffine, IntegratedInput, rk4_step};
-use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter};
+use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder};
 use punctual_core::lie::{self, DerivativeSource};
 use punctual_core::nalgebra::SVector;
 use punctual_reference::plants::{Bicycle, PointMass, SmallSlipBicycle, Unicycle};
@@ -20,13 +20,13 @@ fn source(source: Box<dyn DerivativeSource>, alone: bool) -> Box<dyn DerivativeS
 }
 
 /// A goal, some obstacles, and a limit of the speed, which has another relative degree.
-fn filter<P>(plant: P, draw: &mut Draw, alone: bool) -> SafetyFilter
+fn filter<P>(plant: P, draw: &mut Draw, alone: bool) -> Filter
 where
     P: ControlAffine<4, 2> + Copy + Send + 'static,
 {
     let disc = |x, y, radius| DistanceDisc::new([x, y], radius, 1.0).expect("a disc");
     let along = |barrier| source(lie::along(plant, barrier, 2).expect("a degree"), alone);
-    let mut builder = SafetyFilter::builder(4, 2)
+    let mut builder = Filter::builder(4, 2)
         .source("goal", along(disc(20.0, 10.0, 2.0)), BarrierSettings::within(6.0))
         .expect("a barrier");
     for i in 0..4 {
@@ -89,7 +89,7 @@ fn plants_with_other_numbers_share_nothing() {
     let disc = || DistanceDisc::new([20.0, 10.0], 2.0, 1.0).expect("a disc");
     let built = |alone: bool| {
         let along = |l_r| source(lie::along(bicycle(l_r), disc(), 2).expect("a degree"), alone);
-        SafetyFilter::builder(4, 2)
+        Filter::builder(4, 2)
             .source("short", along(1.0), BarrierSettings::within(6.0))
             .and_then(|b| b.source("long", along(4.0), BarrierSettings::within(5.0)))
             .and_then(FilterBuilder::build)

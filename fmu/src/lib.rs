@@ -6,7 +6,6 @@
 //! | module | owns |
 //! |---|---|
 //! | [`text`] | numbers for people |
-//! | `filter_loop` | a filter with its plans or its integrator, if it has them, and its memory |
 //! | [`configuration`] | the TOML file and the table of numeric parameters |
 //! | [`units`] | the units of two variables that are connected, whoever wrote them |
 //! | [`product`] | variables, value references, model description and GUID of a configuration |
@@ -27,7 +26,6 @@ compile_error!("the FMU guards every exported function against panics, which nee
 mod abi;
 pub mod block;
 pub mod configuration;
-mod filter_loop;
 pub mod instance;
 pub mod product;
 pub mod state;
@@ -37,4 +35,3 @@ pub mod units;
 #[cfg(windows)]
 pub use abi::loadable;
 pub use abi::{PluginFolder, file_name as plugin_file_name, fmi2, fmi3};
-pub use filter_loop::{FilterLoop, LoopState};

@@ -7,7 +7,7 @@
 //! | 38 | the GUID of the FMU, as in its model description |
 //! | 8 | length of all |
 //! | … | the fields of [`State`]: mode, time, flags, values in the order of the table, memory of the block |
-//! | 8 + … | where plans are followed: the length of the commitment, and that in the format of the crate postcard |
+//! | 8 + … | where plans are followed: the length of their memory, and that in the format of the crate postcard |
 //! | 4 | CRC-32 of all before |
 //!
 //! Numbers are little-endian, by their bits. A field has the same place in every state of an FMU; optional ones
@@ -17,7 +17,6 @@ use punctual_core::convergence::{FixedTimeState, Phase, Unmet};
 use punctual_core::filter::{Bend, Commitment, FilterState};
 use punctual_modeldescription::BaseType;
 
-use crate::LoopState;
 use crate::block::{BlockState, Values};
 use crate::configuration::{Configuration, FmiVersion};
 use crate::instance::{Failure, Mode, State};
@@ -37,9 +36,9 @@ const CHECKSUM: usize = u32::SIZE;
 ///
 /// # Errors
 ///
-/// None in practice: a commitment is plain data.
+/// None in practice: a plan is plain data.
 pub fn size(product: &Product, state: &State) -> Result<usize, Failure> {
-    let plan = if follows_plans(product) { u64::SIZE + commitment(state)?.len() } else { 0 };
+    let plan = if follows_plans(product) { u64::SIZE + plan(state)?.len() } else { 0 };
     Ok(fixed_size(product) + plan)
 }
 
@@ -52,13 +51,13 @@ fn follows_plans(product: &Product) -> bool {
     matches!(&product.configuration, Configuration::Filter(c) if c.is_assured())
 }
 
-/// The bytes of the commitment in `state`.
-fn commitment(state: &State) -> Result<Vec<u8>, Failure> {
-    let commitment = match &state.block {
-        BlockState::Filter { memory, .. } => memory.commitment.clone().unwrap_or_default(),
-        _ => Commitment::default(),
-    };
-    postcard::to_stdvec(&commitment).map_err(|e| e.to_string())
+/// The bytes of the memory of plans in `state`.
+fn plan(state: &State) -> Result<Vec<u8>, Failure> {
+    match &state.block {
+        BlockState::Filter { memory, .. } => postcard::to_stdvec(&memory.plan),
+        _ => postcard::to_stdvec(&Commitment::default()),
+    }
+    .map_err(|e| e.to_string())
 }
 
 /// The number of bytes of every state of `product`, but for plans.
@@ -94,7 +93,7 @@ fn fixed_size(product: &Product) -> usize {
 /// Too few bytes; the state of another product. Nothing was written.
 pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), Failure> {
     let State { guid, mode, time, stop, stepped, last_step, fresh, configured, values, block } = state;
-    let plan = follows_plans(product).then(|| commitment(state)).transpose()?;
+    let plan = follows_plans(product).then(|| plan(state)).transpose()?;
     let size = fixed_size(product) + plan.as_ref().map_or(0, |plan| u64::SIZE + plan.len());
     if bytes.len() < size {
         return Err(format!("there is room for {} bytes, must be {size}", bytes.len()));
@@ -127,8 +126,7 @@ pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), F
     // The memory of the block.
     match block {
         BlockState::Filter { rearm_seen, memory } => {
-            let LoopState { filter, integrated, commitment: _ } = &**memory;
-            let FilterState { barriers, time, period, input, start, bends } = filter;
+            let FilterState { barriers, time, period, input, start, bends, integrated, plan: _ } = &**memory;
             rearm_seen.write(&mut out);
             barriers.iter().for_each(|barrier| barrier.write(&mut out));
             time.write(&mut out);
@@ -216,17 +214,17 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
         Configuration::Filter(c) => {
             let rearm_seen = input.field("rearm_seen")?;
             let barriers = c.barrier.iter().map(|b| input.field(&b.name)).collect::<Result<_, _>>()?;
-            let filter = FilterState {
+            let memory = FilterState {
                 barriers,
                 time: input.field("filter time")?,
                 period: input.field("period")?,
                 input: input.field("input")?,
                 start: input.field("start")?,
                 bends: input.field("bends")?,
+                integrated: input.finite("integrated")?,
+                plan: if has_plan { read_plan(&mut input)? } else { Commitment::default() },
             };
-            let integrated = input.finite("integrated")?;
-            let commitment = has_plan.then(|| read_commitment(&mut input)).transpose()?;
-            BlockState::Filter { rearm_seen, memory: Box::new(LoopState { filter, integrated, commitment }) }
+            BlockState::Filter { rearm_seen, memory: Box::new(memory) }
         }
         Configuration::Plant(_) => {
             let x = (0..product.layout.states).map(|_| input.finite("x")).collect::<Result<_, _>>()?;
@@ -244,14 +242,14 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
     Ok(State { guid, mode, time, stop, stepped, last_step, fresh, configured, values, block })
 }
 
-/// The commitment that comes last. Whether it is one of this filter is found when it is restored.
-fn read_commitment(input: &mut Reader) -> Result<Commitment, Failure> {
+/// The memory of plans that comes last. Whether it is one of this filter is found when it is restored.
+fn read_plan(input: &mut Reader) -> Result<Commitment, Failure> {
     let length: u64 = input.field("length of the plan")?;
     if length != input.rest.len() as u64 {
         return Err(format!("the length of the plan is {length} bytes, must be {}", input.rest.len()));
     }
     match postcard::take_from_bytes(input.rest) {
-        Ok((commitment, [])) => Ok(commitment),
+        Ok((plan, [])) => Ok(plan),
         Ok((_, rest)) => Err(format!("the plan is followed by {} bytes, must be 0", rest.len())),
         Err(error) => Err(format!("the plan cannot be read: {error}")),
     }

@@ -2,7 +2,7 @@
 
 #![expect(clippy::print_stdout, reason = "the figures of the search")]
 
-use punctual_core::filter::{AssuredFilter, BarrierSettings, FilterBuilder, SafetyFilter, Sampling};
+use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Sampling};
 use punctual_core::lie::RelativeDegree;
 use punctual_models::Model;
 
@@ -37,9 +37,9 @@ struct Case<'a> {
 }
 
 impl Case<'_> {
-    fn filter(&self) -> AssuredFilter {
+    fn filter(&self) -> Filter {
         let [min, max] = [0, 1].map(|side| self.bounds.iter().map(|b| b[side]).collect::<Vec<f64>>());
-        let mut builder = SafetyFilter::builder(self.states, self.bounds.len());
+        let mut builder = Filter::builder(self.states, self.bounds.len());
         for (k, (expression, n, is_goal)) in self.barriers.iter().enumerate() {
             let settings =
                 if *is_goal { BarrierSettings::within(self.deadline) } else { BarrierSettings::keeping() };
@@ -51,7 +51,7 @@ impl Case<'_> {
             .and_then(|b| b.sampling(Sampling::Period(self.period)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        AssuredFilter::new(filter, self.period).expect("a filter that can be assured")
+        filter.with_plans(self.period).expect("a filter that can be assured")
     }
 
     fn move_by(&self, x: &mut [f64], u: &[f64], dt: f64) {
@@ -71,7 +71,11 @@ impl Case<'_> {
         let (mut filter, mut x, mut u) = (self.filter(), x.to_vec(), vec![0.0; self.bounds.len()]);
         for k in 0..((self.deadline + more) / self.period) as u32 {
             let t = f64::from(k) * self.period;
-            let assurance = *filter.step(t, &x, &wanted(t, &x), &mut u).expect("right dimensions");
+            let assurance = filter
+                .step(t, &x, &wanted(t, &x), &mut u)
+                .expect("right dimensions")
+                .assurance
+                .expect("plans");
             if k == 0 && !assurance.is_assured() {
                 return false;
             }

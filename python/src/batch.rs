@@ -3,7 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
-use punctual_fmu::LoopState;
+use punctual_core::filter::FilterState;
 use punctual_fmu::configuration::FilterConfiguration;
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
@@ -34,8 +34,8 @@ type Rows<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<i32>>, Bound<'p
 pub(crate) struct FilterBatch {
     configuration: FilterConfiguration,
     interface: Interface,
-    memories: Vec<LoopState>,
-    fresh: LoopState,
+    memories: Vec<FilterState>,
+    fresh: FilterState,
     /// Loops, one for each part. The memory of a row is put into its loop before each row.
     // A lock for the compiler's sake: Python lends the object to one call at a time.
     loops: Mutex<Vec<Loop>>,
@@ -138,7 +138,7 @@ impl FilterBatch {
             None => self.u_ref.fill(0.0),
         }
         for (row, (memory, t)) in self.memories.iter().zip(&self.t).enumerate() {
-            forwards(memory.filter.time, *t, Some(row))?;
+            forwards(memory.time, *t, Some(row))?;
         }
         let threads = pool::threads(py)?;
         let most = PARTS_PER_THREAD * threads.current_num_threads();
@@ -184,7 +184,7 @@ impl FilterBatch {
         for (memory, _) in self.memories.iter_mut().zip(&chosen).filter(|(_, chosen)| **chosen) {
             own.restore(memory).map_err(|e| refused(&e))?;
             own.rearm();
-            own.save(memory);
+            memory.clone_from(own.memory());
         }
         self.withdraw(&chosen);
         Ok(())
@@ -208,7 +208,7 @@ impl FilterBatch {
     fn of(configuration: FilterConfiguration, n: usize) -> PyResult<Self> {
         let interface = Interface::of(&configuration);
         let own = Loop::new(&configuration)?;
-        let fresh = own.memory();
+        let fresh = own.memory().clone();
         Ok(Self {
             memories: filled(&fresh, [n, 1])?,
             fresh,
@@ -254,7 +254,7 @@ fn filled<T: Clone>(value: &T, [rows, each]: [usize; 2]) -> PyResult<Vec<T>> {
 /// Rows that one loop computes, one after the other.
 struct Part<'a> {
     own: &'a mut Loop,
-    memories: &'a mut [LoopState],
+    memories: &'a mut [FilterState],
     t: &'a [f64],
     x: &'a [f64],
     u_ref: &'a [f64],
@@ -277,7 +277,7 @@ impl Part<'_> {
                 self.h[i * nb + k] = barrier.h;
                 self.guaranteed[i * nb + k] = barrier.guaranteed;
             }
-            self.own.save(memory);
+            memory.clone_from(self.own.memory());
         }
         Ok(())
     }

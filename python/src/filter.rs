@@ -2,8 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use punctual_core::filter::Standing;
-use punctual_fmu::LoopState;
+use punctual_core::filter::{Assurance, FilterState, Standing};
 use punctual_fmu::configuration::FilterConfiguration;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -34,7 +33,7 @@ pub(crate) struct Filter {
     names: Arc<[String]>,
     // A lock for the compiler's sake: Python lends the object to one call at a time.
     own: Mutex<Loop>,
-    fresh: LoopState,
+    fresh: FilterState,
     x: Vec<f64>,
     u_ref: Vec<f64>,
     u: Vec<f64>,
@@ -54,7 +53,7 @@ impl Filter {
 
     fn __reduce__<'py>(&mut self, py: Python<'py>) -> PyResult<Reduced<'py, (Saved, f64, Vec<f64>)>> {
         let memory = self.own.get_mut().unwrap_or_else(PoisonError::into_inner).memory();
-        let saved = saved::save(&self.configuration, &[memory])?;
+        let saved = saved::save(&self.configuration, std::slice::from_ref(memory))?;
         let (t, x) = self.seen.clone();
         saved::reduced(py, "unpickled_filter", (saved, t, x))
     }
@@ -121,7 +120,7 @@ impl Filter {
             None => self.u_ref.fill(0.0),
         }
         let own = self.own.get_mut().unwrap_or_else(PoisonError::into_inner);
-        forwards(own.filter().filter().state().time, t, None)?;
+        forwards(own.filter().state().time, t, None)?;
         own.step(t, &self.x, &self.u_ref, &mut self.u).map_err(|e| refused(&e))?;
         if t.is_finite() && self.x.iter().all(|x| x.is_finite()) {
             self.seen.0 = t;
@@ -141,7 +140,7 @@ impl Filter {
     #[getter]
     fn refusal(&mut self) -> Option<String> {
         let own = self.own.get_mut().unwrap_or_else(PoisonError::into_inner);
-        let (standing, failure) = own.filter().standing()?;
+        let Assurance { standing, failure, .. } = *own.filter().assurance()?;
         failure.map(|failure| match standing {
             Standing::Refused => self.configuration.refusal(failure),
             _ => self.configuration.failure(failure),
@@ -170,7 +169,7 @@ impl Filter {
         let (states, inputs) = (interface.states.len(), interface.inputs.len());
         Ok(Self {
             names: interface.barriers.names.clone().into(),
-            fresh: own.memory(),
+            fresh: own.memory().clone(),
             own: Mutex::new(own),
             x: vec![0.0; states],
             u_ref: vec![0.0; inputs],

@@ -1,8 +1,8 @@
 //! `Plan`: what keeps the promise of a filter that follows plans.
 
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use punctual_core::filter::Filter;
 use punctual_core::plan::Witness;
-use punctual_fmu::FilterLoop;
 use punctual_fmu::configuration::FilterConfiguration;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -50,36 +50,35 @@ impl Plan {
     /// The plan of `filter`, made of `configuration`, from its last sample, `x` at `t`, if it has one.
     pub(crate) fn of(
         py: Python<'_>,
-        filter: &FilterLoop,
+        filter: &Filter,
         (t, x): (f64, &[f64]),
         configuration: &FilterConfiguration,
     ) -> PyResult<Option<Self>> {
-        let (Some(witness), FilterLoop::Assured(assured)) = (filter.plan(), filter) else { return Ok(None) };
+        let (Some(witness), Some(planning)) = (filter.plan(), filter.planning()) else { return Ok(None) };
         let Witness { inputs: holds, tightest, effort, until, .. } = witness;
         // An integrated input is a state of the way, and its rate the input.
         let states = Signals::of(configuration.plant.states());
         let inputs = Signals::of(configuration.plant.inputs());
         let end = holds.last().map_or(t, |(end, _)| *end);
-        let way = assured.way(witness, t, x, ((end - t) / POINTS).max(f64::MIN_POSITIVE));
-        let rows = assured.filter();
-        let reports = rows.report().barriers.iter().enumerate().filter(|(_, report)| report.guaranteed);
-        let to_come = |left: f64| Some(rows.report().time + left).filter(|at| left > 0.0 && at.is_finite());
+        let way = planning.trajectory(witness, t, x, ((end - t) / POINTS).max(f64::MIN_POSITIVE));
+        let reports = filter.report().barriers.iter().enumerate().filter(|(_, report)| report.guaranteed);
+        let to_come = |left: f64| Some(filter.report().time + left).filter(|at| left > 0.0 && at.is_finite());
         let kept: Vec<_> = reports.map(|(i, report)| (i, to_come(report.time_left))).collect();
         let unit = |&(i, _): &(usize, _)| {
             let barrier = &configuration.barrier[i];
             (barrier.name.clone(), barrier.unit(&configuration.plant))
         };
         let barriers = Signals::new(kept.iter().map(unit));
-        let (mut h, mut values) = (Vec::new(), vec![0.0; rows.barrier_names().count()]);
+        let (mut h, mut values) = (Vec::new(), vec![0.0; filter.barrier_names().count()]);
         for (t, x, _) in &way {
-            rows.barrier_values(*t, x, &mut values).map_err(|e| refused(&e))?;
+            filter.barrier_values(*t, x, &mut values).map_err(|e| refused(&e))?;
             h.extend(kept.iter().map(|(i, _)| values[*i]));
         }
         let times: Vec<f64> = way.iter().map(|(t, ..)| *t).collect();
         let places: Vec<f64> = way.iter().flat_map(|(_, x, _)| x.iter().copied()).collect();
         let held: Vec<f64> = way.iter().flat_map(|(.., u)| u[..inputs.len()].iter().copied()).collect();
         let count = times.len();
-        let name = |barrier: usize| rows.barrier_names().nth(barrier).unwrap_or_default().to_owned();
+        let name = |barrier: usize| filter.barrier_names().nth(barrier).unwrap_or_default().to_owned();
         Ok(Some(Self {
             times: times.into_pyarray(py).unbind(),
             x: places.into_pyarray(py).reshape([count, states.len()])?.unbind(),

@@ -3,8 +3,7 @@
 use std::sync::Arc;
 
 use numpy::PyArray1;
-use punctual_core::filter::{self, Phase, Reason, Standing, Status};
-use punctual_fmu::FilterLoop;
+use punctual_core::filter::{self, Filter, Phase, Reason, Standing, Status};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyType};
@@ -120,14 +119,14 @@ pub(crate) struct Step {
 }
 
 impl Step {
-    pub(crate) fn new(py: Python<'_>, u: &[f64], filter: &FilterLoop, names: &Arc<[String]>) -> Self {
-        let report = filter.filter().report();
+    pub(crate) fn new(py: Python<'_>, u: &[f64], filter: &Filter, names: &Arc<[String]>) -> Self {
+        let (report, assurance) = (filter.report(), filter.assurance());
         Self {
             u: PyArray1::from_slice(py, u).unbind(),
             status: report.status,
-            standing: filter.standing().map(|(standing, _)| standing),
-            assured_until: filter.assured_until(),
-            reason: filter.reason(),
+            standing: assurance.map(|assurance| assurance.standing),
+            assured_until: assurance.and_then(|assurance| assurance.until),
+            reason: assurance.and_then(|assurance| assurance.reason),
             barriers: report.barriers.clone(),
             names: Arc::clone(names),
         }

@@ -1,8 +1,7 @@
 //! One loop: a filter, and all that it remembers between samples.
 
-use punctual_core::filter::Report;
+use punctual_core::filter::{Filter, FilterState, Report};
 use punctual_fmu::configuration::FilterConfiguration;
-use punctual_fmu::{FilterLoop, LoopState};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -28,7 +27,7 @@ pub(crate) fn forwards(last: Option<f64>, t: f64, row: Option<usize>) -> PyResul
 
 /// A filter with its integrator, if it has one: the computation of the FMU of the same configuration.
 pub(crate) struct Loop {
-    filter: FilterLoop,
+    filter: Filter,
     /// Time between steps in s, and the longest, as configured.
     period: f64,
     longest: f64,
@@ -42,7 +41,7 @@ impl Loop {
     }
 
     /// The filter: to look at.
-    pub(crate) fn filter(&self) -> &FilterLoop {
+    pub(crate) fn filter(&self) -> &Filter {
         &self.filter
     }
 
@@ -58,17 +57,16 @@ impl Loop {
         u_ref: &[f64],
         u: &mut [f64],
     ) -> Result<&Report, punctual_core::Error> {
-        let hold = self.hold(t);
-        self.filter.step(t, hold, x, u_ref, u)
+        if self.filter.counts_holds() {
+            self.filter.expect_hold(Some(self.hold(t)))?;
+        }
+        self.filter.step(t, x, u_ref, u)
     }
 
     /// For how long in s the input at `t` is going to be held where nobody says so: as long as the one before was, but no
     /// shorter than the longest that is configured.
     fn hold(&self, t: f64) -> f64 {
-        match &self.filter {
-            FilterLoop::Assured(assured) => assured.usual_hold(t).max(self.longest),
-            _ => self.period,
-        }
+        self.filter.usual_hold(t).map_or(self.period, |usual| usual.max(self.longest))
     }
 
     /// Starts every deadline anew; the integrated input stays.
@@ -77,13 +75,8 @@ impl Loop {
     }
 
     /// What is remembered.
-    pub(crate) fn memory(&self) -> LoopState {
+    pub(crate) fn memory(&self) -> &FilterState {
         self.filter.state()
-    }
-
-    /// Writes the memory to `memory`; only a plan allocates.
-    pub(crate) fn save(&self, memory: &mut LoopState) {
-        self.filter.save(memory);
     }
 
     /// Goes back to a memory: every bit that follows is the same.
@@ -91,7 +84,7 @@ impl Loop {
     /// # Errors
     ///
     /// The memory of another configuration.
-    pub(crate) fn restore(&mut self, memory: &LoopState) -> Result<(), punctual_core::Error> {
+    pub(crate) fn restore(&mut self, memory: &FilterState) -> Result<(), punctual_core::Error> {
         self.filter.restore(memory)
     }
 }

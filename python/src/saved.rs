@@ -3,8 +3,7 @@
 use std::ffi::OsString;
 use std::path::Path;
 
-use punctual_core::filter::{Commitment, FilterState};
-use punctual_fmu::LoopState;
+use punctual_core::filter::FilterState;
 use punctual_fmu::configuration::{Configuration, FilterConfiguration};
 use pyo3::prelude::*;
 
@@ -25,13 +24,11 @@ pub(crate) fn reduced<'py, T>(py: Python<'py>, name: &str, arguments: T) -> PyRe
 }
 
 /// Writes a filter of this configuration.
-pub(crate) fn save(configuration: &FilterConfiguration, memories: &[LoopState]) -> PyResult<Saved> {
+pub(crate) fn save(configuration: &FilterConfiguration, memories: &[FilterState]) -> PyResult<Saved> {
     let configuration = Configuration::Filter(configuration.clone());
     let folder = configuration.plugin().and_then(|plugin| plugin.path.parent()).unwrap_or(Path::new(""));
     let text = configuration.canonical().map_err(|e| refused(&e))?;
-    let bytes = |LoopState { filter, integrated, commitment }: &LoopState| {
-        postcard::to_stdvec(&(filter, integrated, commitment)).map_err(|e| refused(&e))
-    };
+    let bytes = |memory: &FilterState| postcard::to_stdvec(memory).map_err(|e| refused(&e));
     let memories = memories.iter().map(bytes).collect::<PyResult<_>>()?;
     Ok((VERSION.to_owned(), text, folder.into(), memories))
 }
@@ -41,7 +38,7 @@ pub(crate) fn save(configuration: &FilterConfiguration, memories: &[LoopState]) 
 /// # Errors
 ///
 /// The version is another one; the plug-in cannot be used; bytes that are no memory.
-pub(crate) fn load(saved: Saved) -> PyResult<(FilterConfiguration, Vec<LoopState>)> {
+pub(crate) fn load(saved: Saved) -> PyResult<(FilterConfiguration, Vec<FilterState>)> {
     let (version, text, folder, memories) = saved;
     if version != VERSION {
         let message = format!(
@@ -51,9 +48,7 @@ pub(crate) fn load(saved: Saved) -> PyResult<(FilterConfiguration, Vec<LoopState
     }
     let configuration = parse(&text, folder.into(), "")?;
     let memory = |bytes: Vec<u8>| {
-        let (filter, integrated, commitment): (FilterState, f64, Option<Commitment>) =
-            postcard::from_bytes(&bytes).map_err(|e| refused(&format!("memory: cannot be read: {e}")))?;
-        Ok(LoopState { filter, integrated, commitment })
+        postcard::from_bytes(&bytes).map_err(|e| refused(&format!("memory: cannot be read: {e}")))
     };
     let memories = memories.into_iter().map(memory).collect::<PyResult<_>>()?;
     Ok((configuration, memories))

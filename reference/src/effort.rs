@@ -8,38 +8,8 @@ use crate::simulation::Schedule;
 use punctual_core::MAX_INPUTS;
 use punctual_core::dynamics::DynPlant;
 use punctual_core::error::{Error, non_negative, positive};
-use punctual_core::filter::{BarrierSettings, Phase, ProfileKind, Report, SafetyFilter, Status};
+use punctual_core::filter::{BarrierSettings, Filter, Phase, ProfileKind, Report, Status};
 use punctual_core::judge::{Course, Judge, Judgement, Standing, Verdict};
-
-/// A filter in a closed loop: a [`SafetyFilter`], or what has one inside.
-pub trait InLoop {
-    /// Computes and remembers the sample at `t` (s), whose input is held for `hold` s.
-    ///
-    /// # Errors
-    ///
-    /// A slice of the wrong length; a time to hold that is out of range.
-    fn sample(
-        &mut self,
-        t: f64,
-        hold: f64,
-        x: &[f64],
-        u_ref: &[f64],
-        u: &mut [f64],
-    ) -> Result<&Report, Error>;
-
-    /// The filter with the barriers, and the report of the last sample.
-    fn filter(&self) -> &SafetyFilter;
-}
-
-impl InLoop for SafetyFilter {
-    fn sample(&mut self, t: f64, _: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<&Report, Error> {
-        self.step(t, x, u_ref, u)
-    }
-
-    fn filter(&self) -> &SafetyFilter {
-        self
-    }
-}
 
 /// A closed loop to run.
 #[derive(Clone, Copy)]
@@ -122,7 +92,7 @@ impl Running<'_> {
     }
 
     /// Takes an instant between two samples.
-    fn instant(&mut self, filter: &SafetyFilter, t: f64, x: &[f64]) -> Result<(), Error> {
+    fn instant(&mut self, filter: &Filter, t: f64, x: &[f64]) -> Result<(), Error> {
         if filter.report().status != Status::NotArmed {
             filter.barrier_values(t, x, &mut self.h)?;
             let barriers = &filter.report().barriers;
@@ -154,7 +124,7 @@ impl Running<'_> {
     /// Moves the plant over the period that begins at `t`; `last` is the input of the period before.
     fn advance(
         &mut self,
-        filter: &SafetyFilter,
+        filter: &Filter,
         t: f64,
         x: &mut [f64],
         [last, u]: [&[f64]; 2],
@@ -193,7 +163,7 @@ fn standing(phase: Phase) -> Standing {
 ///
 /// A step that is not finite or ≤ 0, and misuse of the filter.
 pub fn run(
-    filter: &mut impl InLoop,
+    filter: &mut Filter,
     setting: &Loop<'_>,
     mut nominal: impl FnMut(f64, &[f64], &mut [f64]),
 ) -> Result<Run, Error> {
@@ -216,16 +186,19 @@ pub fn run(
     };
     let judges = setting.deadlines.iter().map(judge).collect();
     let mut running = Running { setting, judges, run, h: vec![0.0; count] };
+    if filter.counts_holds() {
+        filter.expect_hold(Some(step))?;
+    }
     for k in 0..=setting.schedule.steps {
         let t = t0 + k as f64 * step;
         nominal(t, &x, &mut u_ref);
-        let report = filter.sample(t, step, &x, &u_ref, &mut u)?;
+        let report = filter.step(t, &x, &u_ref, &mut u)?;
         running.sample(t, &x, &u, report);
         let lost = t - t0 >= setting.until && running.is_broken();
         if lost || k == setting.schedule.steps || !x.iter().all(|x| x.is_finite()) {
             break;
         }
-        running.advance(filter.filter(), t, &mut x, [&last, &u])?;
+        running.advance(filter, t, &mut x, [&last, &u])?;
         last.copy_from_slice(&u);
     }
     let mut run = running.run;

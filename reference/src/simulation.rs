@@ -4,7 +4,7 @@ use nalgebra::SVector;
 
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::error::{Error, positive};
-use punctual_core::filter::{Report, SafetyFilter};
+use punctual_core::filter::{Filter, Report};
 
 /// Step size and length of a closed-loop run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,7 +25,7 @@ pub struct Schedule {
 ///
 /// A step that is not finite or ≤ 0, and misuse of the filter.
 pub fn closed_loop<P, const NX: usize, const NU: usize>(
-    filter: &mut SafetyFilter,
+    filter: &mut Filter,
     plant: &P,
     x0: SVector<f64, NX>,
     schedule: Schedule,
@@ -45,7 +45,7 @@ where
 ///
 /// As for [`closed_loop`].
 pub fn closed_loop_by<const NX: usize, const NU: usize>(
-    filter: &mut SafetyFilter,
+    filter: &mut Filter,
     mut advance: impl FnMut(&SVector<f64, NX>, &SVector<f64, NU>, f64) -> SVector<f64, NX>,
     x0: SVector<f64, NX>,
     schedule: Schedule,

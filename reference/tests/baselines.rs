@@ -9,7 +9,7 @@ use punctual_core::convergence::condition::{Abilities, Anchored, Anchoring, Boun
 use punctual_core::convergence::first_order::Exponent;
 use punctual_core::convergence::operator::Operator;
 use punctual_core::dynamics::{ControlAffine, rk4_step};
-use punctual_core::filter::{BarrierSettings, FilterBuilder, Method, Phase, SafetyFilter, Sampling, Status};
+use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Method, Phase, Sampling, Status};
 use punctual_core::lie;
 use punctual_core::nalgebra::{SMatrix, SVector, vector};
 use punctual_core::scalar::Scalar;
@@ -51,7 +51,7 @@ fn follow<const N: usize>(
     end: f64,
 ) -> (Vec<f64>, Phase, Option<f64>) {
     let source = lie::along(Integrators::<N>, First, N).expect("a source");
-    let mut filter = SafetyFilter::builder(N, 1)
+    let mut filter = Filter::builder(N, 1)
         .source("line", source, BarrierSettings::within(DEADLINE))
         .and_then(|b| b.condition(condition))
         .and_then(|b| b.build())
@@ -158,7 +158,7 @@ fn a_tube_is_kept_until_it_is_the_set() {
 fn settings_that_a_condition_would_replace_are_refused() {
     let build = |settings: BarrierSettings| {
         let source = lie::along(Integrators::<1>, First, 1).expect("a source");
-        let builder = SafetyFilter::builder(1, 1).source("line", source, settings).expect("settings");
+        let builder = Filter::builder(1, 1).source("line", source, settings).expect("settings");
         builder.condition(Chain::new(&[ClassK::Linear(1.0)]).unwrap()).err().map(|e| e.to_string())
     };
     let settings = BarrierSettings::within(1.0);
@@ -172,7 +172,7 @@ fn settings_that_a_condition_would_replace_are_refused() {
         build(BarrierSettings { recovery: Some(1.0), ..settings }).unwrap(),
         "line.recovery: a constraint of one's own knows no recovery"
     );
-    let none = SafetyFilter::builder(1, 1).condition(Chain::linear(&[1.0]).unwrap()).err();
+    let none = Filter::builder(1, 1).condition(Chain::linear(&[1.0]).unwrap()).err();
     assert_eq!(none.unwrap().to_string(), "condition: there is no barrier yet to have it");
 }
 
@@ -210,7 +210,7 @@ impl Condition for Complete {
 #[test]
 fn a_condition_that_is_a_method() {
     let settings = BarrierSettings { margin: 0.1, ..BarrierSettings::within(DEADLINE) };
-    let mut filter = SafetyFilter::builder(2, 1)
+    let mut filter = Filter::builder(2, 1)
         .source("line", lie::along(Integrators::<2>, First, 2).expect("a source"), settings)
         .and_then(|b| b.condition(Complete))
         .and_then(|b| b.sampling(Sampling::Period(0.01)))

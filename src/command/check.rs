@@ -4,8 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use punctual_core::elementary;
-use punctual_core::filter::{BarrierSettings, Method, Phase, Refusal, SafetyFilter};
-use punctual_fmu::FilterLoop;
+use punctual_core::filter::{BarrierSettings, Filter, Method, Phase, Refusal};
 use punctual_fmu::configuration::{
     Configuration, ControllerConfiguration, FilterConfiguration, PlantConfiguration, SamplingName,
     VariableSection,
@@ -364,7 +363,6 @@ fn filter(
     let mut filter = closed_loop::filter(c)?;
     // The first step from the start, then the closed loops.
     let status = start.as_deref().map(|x0| first_sample(&mut filter, c, x0)).transpose()?;
-    let filter = filter.filter();
     // Rates and methods are those of the rows, of which there are no more than of the closed loop below.
     let rows = first_rows(c, start.as_deref())?;
     // A filter without a model is not simulated.
@@ -522,18 +520,14 @@ fn filter(
 }
 
 /// The filter of the rows, after its first sample from the start if there is one.
-fn first_rows(c: &FilterConfiguration, start: Option<&[f64]>) -> Result<SafetyFilter, Error> {
-    let mut rows = FilterLoop::Plain(c.build()?);
+fn first_rows(c: &FilterConfiguration, start: Option<&[f64]>) -> Result<Filter, Error> {
+    let mut rows = c.build()?;
     start.map(|x0| first_sample(&mut rows, c, x0)).transpose()?;
-    match rows {
-        FilterLoop::Plain(rows) => Ok(rows),
-        // It is made so above.
-        _ => Ok(c.build()?),
-    }
+    Ok(rows)
 }
 
 /// Warnings on the method of barrier `i` from the first sample of `rows`; `uneven`: its inputs enter at different orders.
-fn of_the_method(c: &FilterConfiguration, rows: &SafetyFilter, i: usize, uneven: bool) -> Vec<String> {
+fn of_the_method(c: &FilterConfiguration, rows: &Filter, i: usize, uneven: bool) -> Vec<String> {
     let mut warnings = Vec::new();
     if uneven && !c.is_assured() {
         let reason = c.unassured();
@@ -632,11 +626,17 @@ fn loop_warnings(run: &LoopReport) -> Vec<String> {
 }
 
 /// Anchors the filter at `x0` with u_ref = 0, and returns the status in words.
-fn first_sample(filter: &mut FilterLoop, c: &FilterConfiguration, x0: &[f64]) -> Result<&'static str, Error> {
+fn first_sample(filter: &mut Filter, c: &FilterConfiguration, x0: &[f64]) -> Result<&'static str, Error> {
     let u_ref = vec![0.0; c.plant.inputs().len()];
     let mut u = u_ref.clone();
-    let report = filter.step(c.experiment.start_time, c.experiment.step_size, x0, &u_ref, &mut u);
-    let status = report.map_err(|e| Error::configuration(e.field(), e.message()))?.status;
+    let mut step = |filter: &mut Filter| {
+        if filter.counts_holds() {
+            filter.expect_hold(Some(c.experiment.step_size))?;
+        }
+        Ok(filter.step(c.experiment.start_time, x0, &u_ref, &mut u)?.status)
+    };
+    let status =
+        step(filter).map_err(|e: punctual_core::Error| Error::configuration(e.field(), e.message()))?;
     Ok(status.name())
 }
 

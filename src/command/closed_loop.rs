@@ -4,8 +4,7 @@
 use std::cell::RefCell;
 
 use punctual_core::dynamics::DynPlant;
-use punctual_core::filter::{ProfileKind, SafetyFilter};
-use punctual_fmu::FilterLoop;
+use punctual_core::filter::{Filter, ProfileKind};
 use punctual_fmu::configuration::{
     Automatic, FilterConfiguration, Functions, ModelName, PlantSection, ProfileName, UNBOUNDED,
     VariableSection,
@@ -273,9 +272,9 @@ fn watched(c: &FilterConfiguration) -> f64 {
 }
 
 /// The filter of the closed loop. An integrator is part of the plant here, so its filter is that of the rows.
-pub(super) fn filter(c: &FilterConfiguration) -> Result<FilterLoop, Error> {
+pub(super) fn filter(c: &FilterConfiguration) -> Result<Filter, Error> {
     let follows = c.is_assured() && c.integrator.is_none();
-    Ok(if follows { c.build_loop()? } else { FilterLoop::Plain(c.build()?) })
+    Ok(if follows { c.build_loop()? } else { c.build()? })
 }
 
 /// The closed loop of the configuration from `x0`, well past every deadline.
@@ -398,7 +397,7 @@ pub(super) struct RatingReport {
 /// A closed loop of `filter` from `x0`, until twice the longest deadline.
 fn run(
     c: &FilterConfiguration,
-    filter: &mut SafetyFilter,
+    filter: &mut Filter,
     (x0, wanted): (&[f64], &Wanted),
     deadlines: &[f64],
 ) -> Result<effort::Run, Error> {
@@ -440,7 +439,7 @@ pub(super) fn reach(
     let filter = c.build()?;
     let t = c.experiment.start_time;
     let horizon = HORIZON * deadline;
-    let soonest = filter.soonest(index, t, x0, horizon).map_err(Error::from)?;
+    let soonest = filter.earliest_arrival(index, t, x0, horizon).map_err(Error::from)?;
     let lost = filter.is_ruled_out(index, t, x0, deadline).map_err(Error::from)?;
     if let Some((found, soonest_at_most)) = plans {
         let deadline = match () {

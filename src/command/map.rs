@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use punctual_core::filter::AssuredFilter;
+use punctual_core::filter::{Filter, Planning};
 use punctual_core::plan::{Failure, Witness};
 use punctual_fmu::configuration::{FilterConfiguration, Shape};
 use rayon::prelude::*;
@@ -88,14 +88,14 @@ pub(super) fn starts(
     kinds.extend(c.barrier.iter().map(|barrier| format!("no plan keeps {}", barrier.name)));
     kinds.extend(["no plan comes to rest", "nothing to promise"].map(str::to_owned));
     let others = c.barrier.len() + 1;
-    let kind = |filter: &AssuredFilter, x: &[f64]| {
+    let kind = |planning: Planning<'_>, x: &[f64]| {
         // Outside of a set without a deadline nothing can be promised of it.
         let lost = c
             .barrier
             .iter()
-            .zip(filter.promised(t, x))
+            .zip(planning.promised(t, x))
             .position(|(b, promised)| !promised && b.penalty.is_none());
-        match (lost, filter.foresee(t, x, 1.0)) {
+        match (lost, planning.plan_from(t, x, 1.0)) {
             (Some(barrier), _)
             | (None, Err(Failure::Broken { barrier, .. } | Failure::Apart { barriers: [barrier, _], .. })) => {
                 barrier + 1
@@ -116,7 +116,8 @@ pub(super) fn starts(
                 let mut x = x0.to_vec();
                 x[plane.states[0]] = centre(0, cell % side);
                 x[plane.states[1]] = centre(1, cell / side);
-                let kind = kind(filter, &x);
+                let planning = filter.planning().ok_or_else(|| refuse("there are none".to_owned()))?;
+                let kind = kind(planning, &x);
                 let done = done.fetch_add(1, Ordering::Relaxed) + 1;
                 if let Ok(mut progress) = progress.lock() {
                     progress.show(done as f64 / (side * side) as f64);
@@ -160,16 +161,16 @@ pub(super) fn starts(
 /// Draws `plan` from `x0` at `t` into `folder`: h, the inputs, and the path where there is a plane.
 pub(super) fn plan(
     c: &FilterConfiguration,
-    (filter, plan): (&AssuredFilter, &Witness),
+    (filter, plan): (&Filter, &Witness),
     (t, x0): (f64, &[f64]),
     folder: &Path,
 ) -> Result<Vec<String>, Error> {
     let end = plan.inputs.last().map_or(t, |(end, _)| *end);
-    let way = filter.way(plan, t, x0, (end - t) / POINTS);
+    let way = filter.planning().map_or(Vec::new(), |own| own.trajectory(plan, t, x0, (end - t) / POINTS));
     let time: Vec<f64> = way.iter().map(|(t, ..)| *t).collect();
     let mut h = vec![vec![0.0; c.barrier.len()]; way.len()];
     for ((t, x, _), h) in way.iter().zip(&mut h) {
-        filter.filter().barrier_values(*t, x, h).map_err(Error::from)?;
+        filter.barrier_values(*t, x, h).map_err(Error::from)?;
     }
     let mut panels = Vec::new();
     for (i, barrier) in c.barrier.iter().enumerate() {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use punctual_core::filter::AssuredFilter;
+use punctual_core::filter::{Filter, Plans};
 use punctual_core::plan::{Failure, Witness};
 use punctual_fmu::configuration::{FilterConfiguration, UNBOUNDED};
 use serde::Serialize;
@@ -85,6 +85,7 @@ pub(super) fn find(
         Ok(filter) => filter,
         Err(reason) => return Ok(Some(refused(reason))),
     };
+    let Some(planning) = filter.planning() else { return Ok(None) };
     let t = c.experiment.start_time;
     let unit = |i: usize| c.barrier[i].unit(&c.plant);
     let plan = |witness: &Witness| PlanReport {
@@ -105,10 +106,10 @@ pub(super) fn find(
     };
     let has_deadline = c.barrier.iter().any(|barrier| barrier.deadline.is_some());
     let (configured, soonest) = match has_deadline {
-        true => filter.appraise(t, x0, AssuredFilter::LONGEST),
-        false => (filter.foresee(t, x0, 1.0), None),
+        true => planning.appraise(t, x0, Plans::LONGEST),
+        false => (planning.plan_from(t, x0, 1.0), None),
     };
-    let left_out = c.barrier.iter().zip(filter.promised(t, x0)).filter(|(_, promised)| !promised);
+    let left_out = c.barrier.iter().zip(planning.promised(t, x0)).filter(|(_, promised)| !promised);
     let left_out = left_out.map(|(barrier, _)| barrier.name.clone()).collect();
     let reason = configured.as_ref().err().map(|failure| c.refusal(*failure));
     // Where the closed loop followed plans in the model, its inputs and the plan in hand then are one as well.
@@ -143,17 +144,17 @@ pub(super) fn find(
 pub(super) fn in_time(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<String>, Error> {
     let has_deadline = c.barrier.iter().any(|barrier| barrier.deadline.is_some());
     let filter = c.assured(c.build()?).ok().filter(|_| has_deadline);
-    let Some(filter) = filter else { return Ok(None) };
+    let Some(planning) = filter.as_ref().and_then(Filter::planning) else { return Ok(None) };
     let (t, x0) = (c.experiment.start_time, &c.measured(x0)[..]);
-    let line = match filter.soonest_later(t, x0, AssuredFilter::LONGEST) {
+    let line = match planning.later_deadline(t, x0, Plans::LONGEST) {
         Some((factor, _)) => {
             let soonest = c.barrier.iter().filter_map(|b| Some((&b.name, factor * b.deadline?)));
             let named: Vec<_> = soonest.map(|(name, at)| format!("{name} {} s", number(at))).collect();
             format!("soonest deadline with a plan: {}", named.join(", "))
         }
-        None if matches!(filter.foresee(t, x0, 1.0), Err(Failure::Apart { .. })) => return Ok(None),
+        None if matches!(planning.plan_from(t, x0, 1.0), Err(Failure::Apart { .. })) => return Ok(None),
         None => {
-            format!("no plan was found for deadlines up to {} times as long either", AssuredFilter::LONGEST)
+            format!("no plan was found for deadlines up to {} times as long either", Plans::LONGEST)
         }
     };
     Ok(Some(line))
@@ -169,7 +170,7 @@ fn in_motion(c: &FilterConfiguration, x0: &[f64]) -> Option<[f64; 2]> {
     let mut c = c.clone();
     c.plan_horizon = Some(horizon);
     let filter = c.assured(c.build().ok()?).ok()?;
-    let until = filter.foresee(c.experiment.start_time, x0, 1.0).ok()?.until;
+    let until = filter.planning()?.plan_from(c.experiment.start_time, x0, 1.0).ok()?.until;
     until.is_finite().then_some([horizon, until])
 }
 
@@ -225,10 +226,7 @@ impl WitnessReport {
         if !soonest.is_empty() {
             lines.push(format!("soonest deadline with a plan: {}", soonest.join(", ")));
         } else if self.has_deadline && !self.found && !self.vain && self.plan.is_none() {
-            lines.push(format!(
-                "none was found for deadlines up to {} times as long either",
-                AssuredFilter::LONGEST
-            ));
+            lines.push(format!("none was found for deadlines up to {} times as long either", Plans::LONGEST));
         }
         if let Some(plan) = &self.plan {
             let inputs: Vec<_> = plan

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::{ControlAffine, rk4_step};
-use punctual_core::filter::{AssuredFilter, BarrierSettings, SafetyFilter, Sampling};
+use punctual_core::filter::{BarrierSettings, Filter, Sampling};
 use punctual_core::lie;
 use punctual_core::nalgebra::SVector;
 use punctual_core::qp::Bounds;
@@ -120,7 +120,7 @@ struct Run {
 }
 
 /// A filter in a loop: the input, and whether the promise is accepted, for time, state and u_ref within its bounds.
-type Filter<const NX: usize> = Box<dyn FnMut(f64, &SVector<f64, NX>, &SVector<f64, 2>) -> Step>;
+type Law<const NX: usize> = Box<dyn FnMut(f64, &SVector<f64, NX>, &SVector<f64, 2>) -> Step>;
 type Step = Result<(SVector<f64, 2>, bool), punctual_core::Error>;
 
 /// A plant with its brake, and what u_ref is.
@@ -145,7 +145,7 @@ fn limits(bounds: [f64; 2]) -> Bounds {
 
 impl<P: ControlAffine<NX, 2>, const NX: usize> Case<'_, P, NX> {
     /// Runs `filter` from `x`.
-    fn run(&self, task: Task, mut filter: Filter<NX>, mut x: SVector<f64, NX>) -> Result<Run, Error> {
+    fn run(&self, task: Task, mut filter: Law<NX>, mut x: SVector<f64, NX>) -> Result<Run, Error> {
         let (disc, limits) = (disc().map_err(Error::from)?, limits(self.bounds));
         let (period, look) = (self.period, self.period / LOOKS as f64);
         let steps = (END / period).round() as usize;
@@ -177,9 +177,9 @@ impl<P: ControlAffine<NX, 2>, const NX: usize> Case<'_, P, NX> {
 }
 
 /// `filter` as a filter in a loop, with or without plans.
-fn ours<const NX: usize>(method: Method, mut filter: SafetyFilter) -> Result<Filter<NX>, Error> {
+fn ours<const NX: usize>(method: Method, mut filter: Filter) -> Result<Law<NX>, Error> {
     if method == Method::Plans {
-        let mut filter = AssuredFilter::new(filter, PERIOD).map_err(Error::from)?;
+        let mut filter = filter.with_plans(PERIOD).map_err(Error::from)?;
         return Ok(Box::new(move |t, x, u_ref| {
             let mut u = *u_ref;
             let assured = filter.step(t, x.as_slice(), u_ref.as_slice(), u.as_mut_slice())?.is_assured();
@@ -209,7 +209,7 @@ where
     let bounds = Body::Of(vehicle).bounds();
     let u_ref = move |x: &SVector<f64, 4>| vehicle.reference(nominal, x);
     let case = Case { plant, bounds, period: PERIOD, nominal: &u_ref };
-    let filter: Filter<4> = match method {
+    let filter: Law<4> = match method {
         Method::Gatekeeper => {
             let mut gatekeeper = Gatekeeper::new(backup(plant, bounds, speeds)?, LEAD);
             Box::new(move |t, x, _| {
@@ -259,7 +259,7 @@ fn point_run((task, method, nominal): (Task, Method, Nominal), x0: [f64; 4]) -> 
     let filter = || {
         let disc = disc()?;
         let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(DEADLINE) };
-        let builder = SafetyFilter::builder(2, 2);
+        let builder = Filter::builder(2, 2);
         let builder = builder.source("goal", lie::along(MovedPoint, disc, 1)?, settings)?;
         let builder = builder.bounds(&bounds.map(|b| -b), &bounds)?;
         let builder = match method {
@@ -269,7 +269,7 @@ fn point_run((task, method, nominal): (Task, Method, Nominal), x0: [f64; 4]) -> 
         builder.build()
     };
     let filter = filter().map_err(Error::from)?;
-    let mut filter: Filter<2> = ours(method, filter)?;
+    let mut filter: Law<2> = ours(method, filter)?;
     if method == Method::Tube {
         let h0 = disc().map_err(Error::from)?.value(0.0, &x0);
         // The gradient is shortest at the edge, and the box of inputs holds the disc of its bound.

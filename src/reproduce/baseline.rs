@@ -2,7 +2,7 @@
 
 use punctual_core::convergence::first_order::Exponent;
 use punctual_core::elementary;
-use punctual_core::filter::{BarrierSettings, FilterBuilder, Method, ProfileKind, SafetyFilter, Sampling};
+use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Method, ProfileKind, Sampling};
 use punctual_core::lie::DerivativeSource;
 use punctual_reference::baselines::{Chain, Exponential, FirstOrderFixedTime, Tube};
 
@@ -120,7 +120,7 @@ impl Baseline {
         self,
         source: Box<dyn DerivativeSource>,
         setup: &super::Setup,
-    ) -> Result<SafetyFilter, punctual_core::Error> {
+    ) -> Result<Filter, punctual_core::Error> {
         let mut settings =
             BarrierSettings { margin: setup.margin, ..BarrierSettings::within(setup.deadline) };
         match self {
@@ -128,7 +128,7 @@ impl Baseline {
             Self::LowPeak => settings.profile = ProfileKind::LowPeak,
             _ => {}
         }
-        let builder = SafetyFilter::builder(source.state_dim(), source.input_dim());
+        let builder = Filter::builder(source.state_dim(), source.input_dim());
         let builder = builder.source("goal", source, settings)?;
         let builder = match self {
             Self::Exponential(a) => builder.condition(Exponential::repeated(2, a)?)?,

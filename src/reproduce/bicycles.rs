@@ -3,10 +3,7 @@
 
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::{DynPlant, Erased};
-use punctual_core::filter::{
-    BarrierSettings, FilterBuilder, IntegratedFilter, Integration, SafetyFilter, Sampling,
-};
-use punctual_fmu::FilterLoop;
+use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Integration, Sampling};
 use punctual_reference::plants::{Bicycle, KinematicBicycle, SmallSlipBicycle, Steering};
 use rayon::prelude::*;
 
@@ -154,7 +151,7 @@ impl Pairing {
         all
     }
 
-    fn controlled(&self) -> Result<FilterLoop, punctual_core::Error> {
+    fn controlled(&self) -> Result<Filter, punctual_core::Error> {
         let Self { size, remedy, step, .. } = *self;
         let settings = BarrierSettings {
             rate: Some(remedy.rate),
@@ -166,7 +163,7 @@ impl Pairing {
         let disc = DistanceDisc::new(CENTRE, RADIUS, SMOOTHING)?;
         let integrates = self.filter != Model::Simplified;
         let (states, second) = if integrates { (5, RATE) } else { (4, size.slip) };
-        let builder = SafetyFilter::builder(states, 2);
+        let builder = Filter::builder(states, 2);
         let filter = match self.filter {
             Model::Simplified => builder.barrier("goal", size.simplified()?, disc, settings),
             Model::SmallSlip => builder.barrier("goal", size.small_slip()?.with_rate(), disc, settings),
@@ -177,14 +174,14 @@ impl Pairing {
             .and_then(|b| b.bounds(&[-ACCELERATION, -second], &[ACCELERATION, second]))
             .and_then(FilterBuilder::build)?;
         if !integrates {
-            return Ok(FilterLoop::Plain(filter));
+            return Ok(filter);
         }
         let limit = match self.filter {
             Model::Kinematic => size.kinematic()?.steering_angle(size.slip),
             _ => size.slip,
         };
         let angle = Integration { state: 4, input: 1, limits: [-limit, limit], gain: GAIN };
-        IntegratedFilter::new(filter, angle).map(FilterLoop::Integrated)
+        filter.with_integrator(angle)
     }
 
     /// Runs from `x0` until 2T. Returns the outcome, and whether a step before the deadline did not meet its
@@ -193,12 +190,15 @@ impl Pairing {
         let setup = Setup::advised(DEADLINE, self.step);
         let plant = self.plant.plant(self.size, self.filter)?;
         let mut filter = self.controlled()?;
+        if filter.counts_holds() {
+            filter.expect_hold(Some(self.step))?;
+        }
         let (mut x, mut u) = (x0, [0.0; 2]);
         let (mut outcome, mut unmet) = (Outcome::default(), false);
         for k in 0..=(setup.end / self.step).round() as usize {
             let t = k as f64 * self.step;
             let u_ref = [-x[3], 0.0];
-            let report = filter.step(t, self.step, &x, &u_ref, &mut u)?;
+            let report = filter.step(t, &x, &u_ref, &mut u)?;
             let (h, satisfied) = (report.barriers[0].h, report.status.is_satisfied());
             let arrival = outcome.arrival.or((h >= 0.0).then_some(t));
             outcome.take(&setup, &Measured { t, position: [x[0], x[1]], u, h, arrival, satisfied });

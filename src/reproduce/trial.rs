@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use punctual_core::elementary;
-use punctual_core::filter::{Report, SafetyFilter};
+use punctual_core::filter::{Filter, Report};
 use punctual_core::nalgebra::SVector;
 use punctual_reference::simulation::{Schedule, closed_loop_by};
 
@@ -199,7 +199,7 @@ pub fn seconds_per_step(
     observed(vehicle, baseline, &setup, x0, |s| samples.push((s.t, s.x, s.u_ref)))?;
     let mut best = f64::INFINITY;
     for _ in 0..PASSES {
-        let mut filter: SafetyFilter =
+        let mut filter: Filter =
             baseline.filter(vehicle.source(setup.shape)?, &setup).map_err(Error::from)?;
         let mut u = [0.0; 2];
         let begin = Instant::now();

@@ -69,14 +69,15 @@ fn an_fmu_follows_plans_as_the_core_does() {
     for k in 0..220 {
         // The time that the FMU has come to, by its own sum.
         let (t, mut u) = (slave.time(), [0.0; 2]);
-        filter.step(t, STEP, &x, &HOSTILE, &mut u).expect("right lengths");
+        filter.expect_hold(Some(STEP)).expect("a hold");
+        filter.step(t, &x, &HOSTILE, &mut u).expect("right lengths");
         sample(&slave, x);
         // Reading ahead of the step changes nothing.
         if k % 3 == 0 {
             assert_eq!(slave.real("u.a").to_bits(), u[0].to_bits(), "{t}");
         }
         slave.step(t, STEP);
-        slave.shows(filter.filter(), &u, &format!("at {t}"));
+        slave.shows(&filter, &u, &format!("at {t}"));
         assert_eq!(slave.integer("assurance"), Standing::Assured as i32, "{t}");
         assert!(slave.flag("goal.guaranteed") && slave.flag("tree.guaranteed"), "{t}");
         let status = slave.integer("status");

@@ -2,7 +2,7 @@
 //!
 //! The oracle is the filter of `punctual-core` with the same configuration.
 
-use punctual_core::filter::{Phase, SafetyFilter, Status};
+use punctual_core::filter::{Filter, Phase, Status};
 use punctual_fmu::configuration::Shape;
 
 use crate::api::API;
@@ -18,12 +18,12 @@ fn inputs(k: usize) -> [f64; 6] {
 const ZERO: [f64; 6] = [0.0; 6];
 const NAN: [f64; 6] = [f64::NAN; 6];
 
-fn oracle(fmu: &Fmu) -> SafetyFilter {
+fn oracle(fmu: &Fmu) -> Filter {
     fmu.filter().build().unwrap()
 }
 
 /// Makes a sample of the oracle, which `commit` remembers; returns u.
-fn sample(filter: &mut SafetyFilter, t: f64, inputs: &[f64; 6], commit: bool) -> [f64; 2] {
+fn sample(filter: &mut Filter, t: f64, inputs: &[f64; 6], commit: bool) -> [f64; 2] {
     let (x, u_ref) = inputs.split_at(4);
     let mut u = [f64::NAN; 2];
     let done = if commit { filter.step(t, x, u_ref, &mut u) } else { filter.peek(t, x, u_ref, &mut u) };

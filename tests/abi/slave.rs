@@ -3,7 +3,7 @@
 use std::ffi::{CStr, CString, c_int, c_void};
 use std::sync::Mutex;
 
-use punctual_core::filter::SafetyFilter;
+use punctual_core::filter::Filter;
 use punctual_modeldescription::BaseType;
 
 use crate::api::{API, Api, Callbacks, Component, ERROR, OK, State, Text, callbacks};
@@ -250,7 +250,7 @@ impl<'a> Slave<'a> {
     }
 
     /// Asserts that every output shows the last sample of `filter` and the input `u`, bit for bit.
-    pub(crate) fn shows(&self, filter: &SafetyFilter, u: &[f64], when: &str) {
+    pub(crate) fn shows(&self, filter: &Filter, u: &[f64], when: &str) {
         let report = filter.report();
         for (signal, wanted) in self.fmu.filter().plant.inputs().iter().zip(u) {
             let found = self.real(&format!("u.{}", signal.name));

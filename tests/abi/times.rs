@@ -1,12 +1,12 @@
 //! Communication points and steps as importers really pass them.
 
-use punctual_core::filter::SafetyFilter;
+use punctual_core::filter::Filter;
 
 use crate::api::API;
 use crate::fmu::{FILTER, Fmu, PLANT};
 use crate::slave::Slave;
 
-fn sample(filter: &mut SafetyFilter, t: f64, x: &[f64; 6]) -> [f64; 2] {
+fn sample(filter: &mut Filter, t: f64, x: &[f64; 6]) -> [f64; 2] {
     let mut u = [f64::NAN; 2];
     filter.step(t, &x[..4], &x[4..], &mut u).unwrap();
     u

@@ -8,7 +8,7 @@
 
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::rk4_step;
-use punctual_core::filter::{BarrierSettings, SafetyFilter, Sampling};
+use punctual_core::filter::{BarrierSettings, Filter, Sampling};
 use punctual_core::nalgebra::{SVector, Vector2};
 use punctual_reference::plants::Unicycle;
 
@@ -29,10 +29,10 @@ enum Order {
 }
 
 /// The filter of examples/vehicles/unicycle-filter.toml.
-fn filter() -> SafetyFilter {
+fn filter() -> Filter {
     let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0).expect("a disc");
     let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(10.0) };
-    let builder = SafetyFilter::builder(4, 2).barrier("goal", Unicycle, goal, settings);
+    let builder = Filter::builder(4, 2).barrier("goal", Unicycle, goal, settings);
     let sampling = Sampling::Measured { first: Some(STEP) };
     builder.and_then(|b| b.sampling(sampling)).and_then(|b| b.build()).expect("a filter")
 }

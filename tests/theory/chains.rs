@@ -2,7 +2,7 @@
 
 use punctual_core::barrier::Barrier;
 use punctual_core::dynamics::ControlAffine;
-use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter};
+use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder};
 use punctual_core::lie;
 use punctual_core::nalgebra::{self, SMatrix, SVector, vector};
 use punctual_core::scalar::Scalar;
@@ -45,7 +45,7 @@ fn from_rest<const N: usize>(step: f64) -> (Option<f64>, f64) {
         ..BarrierSettings::within(DEADLINE)
     };
     let mut filter = lie::along(Chain::<N>, NonNegative, N)
-        .and_then(|source| SafetyFilter::builder(N, 1).source("line", source, settings))
+        .and_then(|source| Filter::builder(N, 1).source("line", source, settings))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
     let mut x0 = SVector::<f64, N>::zeros();

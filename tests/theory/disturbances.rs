@@ -3,7 +3,7 @@
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::StateBound;
 use punctual_core::dynamics::ControlAffine;
-use punctual_core::filter::{BarrierSettings, SafetyFilter};
+use punctual_core::filter::{BarrierSettings, Filter};
 use punctual_core::nalgebra::{self, SMatrix, SVector, vector};
 use punctual_core::scalar::Scalar;
 use punctual_reference::plants::PointMass;
@@ -68,7 +68,7 @@ where
 {
     let mut failures = Failures::default();
     for start in starts {
-        let mut filter = SafetyFilter::builder(NX, NU)
+        let mut filter = Filter::builder(NX, NU)
             .barrier("goal", model, barrier, settings)
             .and_then(|b| b.build())
             .expect("a valid filter");

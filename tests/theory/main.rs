@@ -20,7 +20,7 @@ mod starts;
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
 use punctual_core::dynamics::ControlAffine;
-use punctual_core::filter::{BarrierSettings, FilterBuilder, Method, SafetyFilter, Sampling};
+use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Method, Sampling};
 use punctual_core::nalgebra::{self, SVector, vector};
 use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
 use punctual_reference::simulation::{Schedule, closed_loop};
@@ -124,7 +124,7 @@ where
     P: ControlAffine<4, 2> + Clone + Send + 'static,
     B: Barrier<4> + Send + 'static,
 {
-    let mut filter = SafetyFilter::builder(4, 2)
+    let mut filter = Filter::builder(4, 2)
         .barrier("goal", plant.clone(), barrier, settings)
         .and_then(|b| b.sampling(scheme.sampling))
         .and_then(|b| b.bounds(&scheme.bounds.map(|v| -v), &scheme.bounds))

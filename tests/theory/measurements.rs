@@ -3,7 +3,7 @@
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::StateBound;
 use punctual_core::dynamics::{ControlAffine, rk4_step};
-use punctual_core::filter::{BarrierSettings, SafetyFilter, Sampling};
+use punctual_core::filter::{BarrierSettings, Filter, Sampling};
 use punctual_core::nalgebra::{self, SVector, vector};
 use punctual_reference::plants::PointMass;
 
@@ -46,7 +46,7 @@ where
     let mut failures = Failures::default();
     let mut random = uniform();
     for start in starts {
-        let mut filter = SafetyFilter::builder(NX, NU)
+        let mut filter = Filter::builder(NX, NU)
             .barrier("goal", plant, barrier, settings)
             .and_then(|b| b.measurement_errors(if allowed { &errors } else { &[0.0; NX] }))
             .and_then(|b| b.sampling(Sampling::Measured { first: Some(STEP) }))

@@ -4,7 +4,7 @@
 
 use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::dynamics::{ControlAffine, rk4_step};
-use punctual_core::filter::{BarrierSettings, FilterBuilder, SafetyFilter, Status};
+use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Status};
 use punctual_core::nalgebra::SVector;
 use punctual_reference::nominal::Heading;
 use punctual_reference::plants::{Bicycle, Unicycle};
@@ -49,7 +49,7 @@ struct Run {
 pub(crate) type Nominal = fn(Heading, &[f64; 4]) -> [f64; 2];
 
 /// A filter for goal and obstacles.
-pub(crate) fn filter<P>(plant: &P, bounds: [f64; 2]) -> SafetyFilter
+pub(crate) fn filter<P>(plant: &P, bounds: [f64; 2]) -> Filter
 where
     P: ControlAffine<4, 2> + Clone + Send + 'static,
 {
@@ -62,7 +62,7 @@ where
         margin: 0.1,
         ..BarrierSettings::within(DEADLINE)
     };
-    let mut builder = SafetyFilter::builder(4, 2)
+    let mut builder = Filter::builder(4, 2)
         .barrier("goal", plant.clone(), goal, reach)
         .and_then(|b| b.bounds(&bounds.map(|v| -v), &bounds))
         .expect("valid goal");

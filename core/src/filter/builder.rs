@@ -7,13 +7,8 @@ use alloc::vec::Vec;
 
 use nalgebra::SVector;
 
-use super::errors::{self, MeasurementErrors};
-use super::search::Scratch;
-use super::shared::SharedPlants;
-use super::{
-    BarrierSettings, BarrierSlot, Begin, End, FilterState, Report, SafetyFilter, Sampling, Strictness,
-    Workspace,
-};
+use super::rows::{self, BarrierSlot, MeasurementErrors, Rows, Scratch, SharedPlants, Workspace};
+use super::{BarrierSettings, Begin, End, Filter, FilterState, Report, Sampling, Strictness};
 use crate::barrier::Barrier;
 use crate::convergence::condition::Condition;
 use crate::convergence::profile::Profile;
@@ -24,7 +19,7 @@ use crate::lie::{self, DerivativeSource};
 use crate::qp::{self, Backend, Bounds, Enforcement, Row};
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE, MAX_ROWS};
 
-/// A collection of barriers and bounds for a [`SafetyFilter`].
+/// A collection of barriers and bounds for a [`Filter`].
 pub struct FilterBuilder {
     state_dim: usize,
     input_dim: usize,
@@ -71,7 +66,7 @@ impl FilterBuilder {
     /// # use punctual_core::{barriers::DistanceDisc, filter::*};
     /// # use punctual_reference::plants::SmallSlipBicycle;
     /// let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
-    /// let refused = SafetyFilter::builder(4, 2)
+    /// let refused = Filter::builder(4, 2)
     ///     .barrier("goal", SmallSlipBicycle::new(10.0)?, goal, BarrierSettings::within(10.0))
     ///     .err()
     ///     .map(|error| error.to_string());
@@ -158,7 +153,7 @@ impl FilterBuilder {
     ///
     /// // Arrive in nine tenths of the time.
     /// let early = |anchor: &[f64], deadline: f64, elapsed: f64| Hermite.evaluate(anchor, 0.9 * deadline, elapsed);
-    /// let filter = SafetyFilter::builder(4, 2)
+    /// let filter = Filter::builder(4, 2)
     ///     .barrier("goal", PointMass, DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
     ///     .profile(early)?
     ///     .build()?;
@@ -185,7 +180,7 @@ impl FilterBuilder {
     /// # use punctual_reference::plants::PointMass;
     /// use punctual_reference::baselines::Exponential;
     ///
-    /// let filter = SafetyFilter::builder(4, 2)
+    /// let filter = Filter::builder(4, 2)
     ///     .barrier("goal", PointMass, DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
     ///     .condition(Exponential::repeated(2, 1.5)?)?
     ///     .build()?;
@@ -207,7 +202,7 @@ impl FilterBuilder {
     /// # use punctual_reference::plants::PointMass;
     /// // In A by 5 s, then in B by 10 s.
     /// let disc = |x| DistanceDisc::new([x, 0.0], 2.0, 2.0);
-    /// let filter = SafetyFilter::builder(4, 2)
+    /// let filter = Filter::builder(4, 2)
     ///     .barrier("A", PointMass, disc(20.0)?, BarrierSettings::within(5.0))?
     ///     .window(Begin::AtOnce, End::OnArrival)?
     ///     .barrier("B", PointMass, disc(-20.0)?, BarrierSettings::within(10.0))?
@@ -358,7 +353,7 @@ impl FilterBuilder {
     ///
     /// Before, nothing is asked and nothing is promised: the input is u_ref within its bounds, the status
     /// [`NotArmed`](super::Status::NotArmed). From then on every bit is that of a filter whose first sample came then.
-    /// [`SafetyFilter::rearm`] does not make it wait again.
+    /// [`Filter::rearm`] does not make it wait again.
     ///
     /// # Errors
     ///
@@ -412,7 +407,7 @@ impl FilterBuilder {
     /// delay that exceeds a given sampling period, or that a source cannot predict over. Measurement errors with a
     /// delay, without a prediction over the period, with a method that does not allow for them, or with a source
     /// that gives no derivatives along a direction.
-    pub fn build(self) -> Result<SafetyFilter, Error> {
+    pub fn build(self) -> Result<Filter, Error> {
         let Self {
             state_dim,
             input_dim,
@@ -459,7 +454,7 @@ impl FilterBuilder {
         // Measurement errors.
         let errors = MeasurementErrors::new(&errors);
         if !errors.is_exact() {
-            errors::check_all(&mut slots, sampling, delay)?;
+            rows::check_all_errors(&mut slots, sampling, delay)?;
         }
         for slot in &mut slots {
             slot.now.slopes = vec![[0.0; MAX_RELATIVE_DEGREE]; errors.count()];
@@ -479,7 +474,7 @@ impl FilterBuilder {
         };
         let deadlines = slots.iter().map(|slot| slot.promise.deadline());
         let first_period = sampling.first(deadlines.fold(f64::INFINITY, f64::min));
-        Ok(SafetyFilter {
+        let rows = Rows {
             state_dim,
             input_dim,
             slots,
@@ -496,6 +491,13 @@ impl FilterBuilder {
             is_backed: false,
             state,
             workspace,
+        };
+        Ok(Filter {
+            rows,
+            integrator: None,
+            #[cfg(feature = "plan")]
+            backup: None,
+            expected: None,
         })
     }
 }

@@ -1,118 +1,47 @@
 //! The safety filter: from time, state and reference input to a safe input and a report.
 //!
-//! A step is in `step`, in the order of the mathematics: evaluate the derivatives of every barrier, move its
-//! phase, build its row, solve the QP, report. [`FilterState`] is all that is remembered between samples: plain
-//! data. Everything else can be rebuilt without changing a bit of the result.
+//! A [`Filter`] has rows, one per barrier, and where they are wanted an integrator before one of its inputs and backup plans:
+//!
+//! | module | owns |
+//! |---|---|
+//! | `rows` | the constraints of a sample, the QP under them, its derivative |
+//! | `integrator` | an input that is commanded as the integral of the filter's own |
+//! | `backup` | the plan behind every input, and what is promised of it |
+//! | `state` | all that is remembered between samples: plain data; everything else can be rebuilt without changing a bit |
 
 #[cfg(feature = "plan")]
-mod assured;
+mod backup;
 mod builder;
-#[cfg(feature = "plan")]
-mod deviation;
-mod errors;
-mod hold;
 mod integrator;
-mod outlook;
 mod questions;
 mod report;
+mod rows;
 mod sampling;
-mod search;
-mod sensitivity;
-mod shared;
-mod slot;
-mod step;
+mod state;
 
 pub use crate::convergence::{
     FixedTimeSettings as BarrierSettings, Infeasible, Method, Phase, ProfileKind, Refusal,
 };
 #[cfg(feature = "plan")]
-pub use assured::{Assurance, AssuredFilter, Commitment, Driver, Pace, Reason, Standing};
+pub use backup::{Assurance, Commitment, Driver, Planning, Plans, Reason, Standing};
 pub use builder::FilterBuilder;
-pub use integrator::{IntegratedFilter, Integration};
+pub use integrator::Integration;
 pub use report::{BarrierReport, Report, Status};
+pub use rows::{BarrierDerivative, Begin, Bend, End, NoDerivative, SampleDerivative, Strictness};
 pub use sampling::Sampling;
-pub use search::Bend;
-pub use sensitivity::{BarrierDerivative, NoDerivative, SampleDerivative};
-pub use slot::{Begin, End, Strictness};
+pub use state::FilterState;
 
 use alloc::boxed::Box;
-use alloc::vec::Vec;
 
+#[cfg(feature = "plan")]
 use crate::MAX_INPUTS;
 use crate::convergence::FixedTimeState;
 use crate::error::{Error, ErrorKind, length, positive};
-use crate::lie::DerivativeSource;
-use crate::qp::{self, Bounds, Enforcement, Problem, Residuals, Row};
-use errors::MeasurementErrors;
-use search::Requirement;
-use shared::SharedPlants;
-use slot::BarrierSlot;
-
-/// The memory of a filter between samples: one promise per barrier, the times that [`Sampling`] needs, and where the search
-/// for the next input begins.
-///
-/// With the feature `serde` it can be written to a file, bit for bit (serde_json needs its feature `float_roundtrip` for
-/// that). Infinities are words in formats for people, as JSON has none. [`SafetyFilter::restore`] checks what is read.
-#[derive(Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct FilterState {
-    /// Promises, in the order of the barriers.
-    pub barriers: Vec<FixedTimeState>,
-    /// Time of the last sample with valid inputs, in s.
-    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
-    pub time: Option<f64>,
-    /// The measured sampling period in s, under [`Sampling::Measured`] from the second sample on.
-    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
-    pub period: Option<f64>,
-    /// The input handed out at [`Self::time`], or last while not armed; zeros above the number of inputs.
-    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
-    pub input: [f64; MAX_INPUTS],
-    /// Time of the first sample in s, valid or not, where the filter is [armed later](FilterBuilder::arm_after) than that.
-    #[cfg_attr(feature = "serde", serde(default, with = "crate::real"))]
-    pub start: Option<f64>,
-    /// How the active row bent at the sample before [`Self::time`] and at that, where one alone was active: the search over the
-    /// period begins from the former if that sample is taken again, else from the latter. Promises do not depend on it.
-    #[cfg_attr(feature = "serde", serde(default))]
-    pub bends: [Option<Bend>; 2],
-}
-
-impl Clone for FilterState {
-    fn clone(&self) -> Self {
-        Self { barriers: self.barriers.clone(), ..*self }
-    }
-
-    /// Reuses the memory, which a derived `Clone` would not: a step must not allocate.
-    fn clone_from(&mut self, source: &Self) {
-        let Self { barriers, time, period, input, start, bends } = source;
-        self.barriers.clone_from(barriers);
-        (self.time, self.period, self.input, self.start) = (*time, *period, *input, *start);
-        self.bends = *bends;
-    }
-}
-
-impl FilterState {
-    /// Whether a filter that is armed `after` seconds from its first sample is so at `t`: once it is, it stays so.
-    #[inline]
-    fn is_armed(&self, t: f64, after: f64) -> bool {
-        let reached = |start: f64| t - start >= after - SAME_TIME * t.abs().max(after);
-        after == 0.0 || self.time.is_some() || self.start.is_none_or(reached)
-    }
-
-    /// The bend of the active row from which the search at `t` begins.
-    #[inline]
-    fn bend_before(&self, t: f64) -> &Option<Bend> {
-        let [before, last] = &self.bends;
-        if self.time.is_some_and(|time| t > time) { last } else { before }
-    }
-
-    /// Becomes `next`, which keeps memory alone.
-    #[inline(always)]
-    fn take(&mut self, next: &mut Self) {
-        core::mem::swap(&mut self.barriers, &mut next.barriers);
-        (self.time, self.period, self.input, self.start) = (next.time, next.period, next.input, next.start);
-        self.bends = next.bends;
-    }
-}
+use crate::lie::{DerivativeSource, Direction};
+#[cfg(feature = "plan")]
+use backup::Backup;
+use integrator::Integrator;
+use rows::{BarrierSlot, Rows, SharedPlants};
 
 /// Round-off of a time that is a sum of steps, as a part of it.
 const SAME_TIME: f64 = 1e-12;
@@ -120,63 +49,57 @@ const SAME_TIME: f64 = 1e-12;
 /// Periods that differ by less than this part of them count as equal.
 const SAME_PERIOD: f64 = 1e-6;
 
-/// Scratch memory of a step; its contents change no bit of the next one.
-struct Workspace {
-    /// Rows of the QP, each with its enforcement.
-    rows: Vec<Row>,
-    enforcement: Vec<Enforcement>,
-    /// Bounds that the input held over the period has to meet.
-    requirements: Vec<Requirement>,
-    next: FilterState,
-    /// Room for one state.
-    scratch: Vec<f64>,
-    report: Report,
-    search: search::Scratch,
-    qp: qp::Workspace,
-}
-
 /// A filter on the input, made of barriers with deadlines: `min ½‖u − u_ref‖²` under one row per barrier
-/// and the input bounds.
+/// and the input bounds, and [with plans](Self::with_plans) a verified backup plan behind every input.
 ///
 /// # Requirements
 ///
 /// The plant is control-affine and every barrier has the relative degree it was declared with;
-/// inputs are held between samples ([`Sampling`]). A barrier's guarantee
+/// inputs are held between samples ([`Sampling`]). By the rows alone a barrier's guarantee
 /// needs every step satisfied ([`Status::is_satisfied`]); [`BarrierReport::on_course`] says whether
-/// its theorem's conditions have held so far.
+/// its theorem's conditions have held so far. With plans it is [`BarrierReport::guaranteed`].
 ///
 /// # References
 ///
-/// The paper, section III; the module [`crate::convergence`].
-pub struct SafetyFilter {
-    state_dim: usize,
-    input_dim: usize,
-    slots: Vec<BarrierSlot>,
-    bounds: Bounds,
-    /// Whether an input has a bound: without any nothing is ruled out.
-    bounded: bool,
-    correction_limit: f64,
-    sampling: Sampling,
-    delay: f64,
-    errors: MeasurementErrors,
-    /// The period in s that [`Sampling::Measured`] starts from.
-    first_period: f64,
-    /// The longest time in s between two samples, 0 where it is not given.
-    period_max: f64,
-    /// The time in s from the first sample until the filter is armed.
-    arm_after: f64,
-    /// The time in s for which the next input will be held, if somebody said so.
+/// The paper, section III; the module [`crate::convergence`]; `docs/theory.md#witness` for plans.
+pub struct Filter {
+    rows: Rows,
+    integrator: Option<Integrator>,
+    #[cfg(feature = "plan")]
+    backup: Option<Box<Backup>>,
+    /// The time in s for which an integrated input, or one with plans, is going to be held, where it is known.
     expected: Option<f64>,
-    /// Whether a plan stands behind the next step, so that rows need not be met.
-    is_backed: bool,
-    state: FilterState,
-    workspace: Workspace,
 }
 
-impl SafetyFilter {
+impl Filter {
     /// Starts a filter for a plant with `state_dim` states and `input_dim` inputs.
     pub fn builder(state_dim: usize, input_dim: usize) -> FilterBuilder {
         FilterBuilder::new(state_dim, input_dim)
+    }
+
+    /// Puts an integrator between the filter and its plant. Plans come after it.
+    ///
+    /// # Errors
+    ///
+    /// A state or an input that there is not; limits that are not min ≤ max; bounds of the rate that exclude 0; a delayed
+    /// filter; a gain out of range; a filter that has an integrator or plans already.
+    pub fn with_integrator(mut self, of: Integration) -> Result<Self, Error> {
+        #[cfg(feature = "plan")]
+        if self.backup.is_some() {
+            let message = "comes after the plans, must come before them";
+            return Err(Error::new(ErrorKind::Unsupported, "integrator", message));
+        }
+        if self.integrator.is_some() {
+            return Err(Error::new(
+                ErrorKind::Unsupported,
+                "integrator",
+                "is a second one, must be the only one",
+            ));
+        }
+        let integrator = Integrator::new(&self.rows, of)?;
+        self.rows.state.integrated = integrator.limited(0.0);
+        self.integrator = Some(integrator);
+        Ok(self)
     }
 
     /// Computes the safe input at time `t` and remembers the sample. The first call with valid inputs
@@ -187,17 +110,18 @@ impl SafetyFilter {
     /// - `u_ref`: the input wanted by whoever is in control.
     /// - `u`: receives the safe input: always finite and within the bounds.
     ///
-    /// Does not allocate. Numerical outcomes (infeasible, no control authority, not-a-number
+    /// Does not allocate, except for plans. Numerical outcomes (infeasible, no control authority, not-a-number
     /// inputs) are the report's [`Status`], never an error.
     ///
     /// # Errors
     ///
-    /// A slice of the wrong length.
+    /// A slice of the wrong length; an integrated input of which it is not known how long it is held
+    /// ([`Self::expect_hold`]).
     ///
     /// ```
     /// # use punctual_core::{barriers::DistanceDisc, filter::*};
     /// # use punctual_reference::plants::PointMass;
-    /// let mut filter = SafetyFilter::builder(4, 2)
+    /// let mut filter = Filter::builder(4, 2)
     ///     .barrier("goal", PointMass, DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
     ///     .build()?;
     /// let mut u = [0.0; 2];
@@ -207,108 +131,314 @@ impl SafetyFilter {
     /// ```
     pub fn step(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<&Report, Error> {
         self.sample(t, x, u_ref, u)?;
-        self.state.take(&mut self.workspace.next);
-        Ok(&self.workspace.report)
+        let Rows { state, workspace, .. } = &mut self.rows;
+        state.take_rows(&mut workspace.next);
+        #[cfg(feature = "plan")]
+        if let Some(backup) = &mut self.backup {
+            core::mem::swap(&mut state.plan, &mut workspace.next.plan);
+            backup.forget();
+        }
+        Ok(&workspace.report)
     }
 
-    /// Computes what [`Self::step`] would, without remembering the sample.
+    /// Computes what [`Self::step`] would, without remembering the sample. With plans the same step after it costs nothing.
     ///
     /// # Errors
     ///
     /// As for [`Self::step`].
     pub fn peek(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<&Report, Error> {
         self.sample(t, x, u_ref, u)?;
-        Ok(&self.workspace.report)
+        Ok(&self.rows.workspace.report)
     }
 
-    /// Forgets the anchors: the next sample with valid inputs starts every deadline anew. The time until the filter is
-    /// [armed](FilterBuilder::arm_after) counts from its first sample all the same.
+    /// Takes a sample, in the order rows, plan, integrator: writes its input to `u`, and its report and the state after it to the
+    /// workspace.
+    fn sample(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<(), Error> {
+        let hold = self.hold(t)?;
+        let Self { rows, integrator, .. } = self;
+        #[cfg(feature = "plan")]
+        if let Some(backup) = &mut self.backup {
+            length("x", x.len(), rows.state_dim - usize::from(integrator.is_some()))?;
+            length("u_ref", u_ref.len(), rows.input_dim)?;
+            length("u", u.len(), rows.input_dim)?;
+            if backup.recall(t, hold, x, u_ref, u) {
+                return Ok(());
+            }
+            rows.is_backed = backup.is_behind(&rows.state.plan, t, hold, integrator.is_some());
+        }
+        // The rows, on the model's state.
+        match integrator {
+            None => rows.sample(t, x, u_ref, u)?,
+            Some(own) => {
+                own.begin(rows, hold, x, u_ref)?;
+                rows.sample(t, &own.x[0], &own.u_ref[0], u)?;
+            }
+        }
+        // The plan behind their answer, or in its place.
+        #[cfg(feature = "plan")]
+        if let Some(backup) = &mut self.backup {
+            backup.sample((rows, integrator.as_ref()), t, hold, x, u_ref, u);
+        }
+        // The mean of the integral in the place of the rate.
+        #[cfg(feature = "plan")]
+        let inside = core::array::from_fn(|i| u.get(i).copied().unwrap_or(0.0));
+        if let Some(own) = integrator {
+            rows.workspace.next.integrated = own.finish(rows.state.integrated, hold, u);
+        }
+        #[cfg(feature = "plan")]
+        if let Some(backup) = &mut self.backup {
+            backup.remember((t, hold), x, u_ref, u, inside);
+        }
+        Ok(())
+    }
+
+    /// Whether plans or an integrator need to know how long inputs are held ([`Self::expect_hold`]).
+    pub fn counts_holds(&self) -> bool {
+        #[cfg(feature = "plan")]
+        if self.backup.is_some() {
+            return true;
+        }
+        self.integrator.is_some()
+    }
+
+    /// Sets the time in s, finite, > 0, for which the input of the next sample will be held; `None` where it is not known. It is for
+    /// callers that know it, such as a co-simulation slave from its step size, and it is not part of [`Self::state`].
+    ///
+    /// Plans count with it, else with their own period; an integrator too, else with the sampling period. Without either, rows under
+    /// [`Sampling::Measured`] are over it at every sample.
+    ///
+    /// # Errors
+    ///
+    /// A time out of range.
+    pub fn expect_hold(&mut self, hold: Option<f64>) -> Result<(), Error> {
+        let hold = hold.map(|hold| positive("hold", hold)).transpose()?;
+        *(if self.counts_holds() { &mut self.expected } else { &mut self.rows.expected }) = hold;
+        Ok(())
+    }
+
+    /// The time in s for which the input at `t` is going to be held, where an integrator or plans count with it; else 0.
+    fn hold(&self, t: f64) -> Result<f64, Error> {
+        #[cfg(feature = "plan")]
+        if let Some(backup) = &self.backup {
+            return Ok(self.expected.unwrap_or(backup.period()));
+        }
+        match (&self.integrator, self.expected) {
+            (None, _) => Ok(0.0),
+            (Some(_), Some(hold)) => Ok(hold),
+            (Some(_), None) => {
+                let Rows { sampling, state, first_period, .. } = &self.rows;
+                let period = sampling.period(state, t, *first_period, None).filter(|period| *period > 0.0);
+                period.filter(|period| period.is_finite()).ok_or_else(|| {
+                    let message = "is not known, must be given by `expect_hold` or as a sampling period";
+                    Error::new(ErrorKind::Range, "hold", message)
+                })
+            }
+        }
+    }
+
+    /// Computes the derivative of what [`Self::peek`] returns where x and u_ref move along `direction`. Remembers
+    /// nothing; the report is that of the sample.
+    ///
+    /// Exact for the piece in force. The input is a piecewise smooth function. Where rows, bounds, a phase or the
+    /// better of two searches change, it has a kink or a jump; the derivative is that of the piece on which the
+    /// sample was computed. A later deadline that was found at this sample ([`Infeasible::Soonest`](Infeasible::Soonest))
+    /// is held. Where more rows are active than inputs can follow, the first ones count.
+    ///
+    /// The change of the rate and margin chosen for a set that is kept ([`stay::keep`](crate::convergence::stay::keep)) is a
+    /// quotient of differences, to some 1e-8. So are, to some 1e-4, all but h where the input comes of more than the rows: with [measurement errors](FilterBuilder::measurement_errors), where an instant between two samples
+    /// counts, and where the search over the period ended beside the nearest input. Next to a kink they are those of the rows
+    /// linearised at the answer, with errors and instants held.
+    ///
+    /// With plans the piece is u_ref, the answer of the rows, the plan's own input or a compromise of these. The plan's own input is
+    /// held: it was fixed at an earlier sample. Where the plan is new, or its input comes of feedback, that is the derivative as if it
+    /// had been there. The value of an integrated input after the step moves by twice as much as its mean.
+    ///
+    /// By status:
+    ///
+    /// - [`Unchanged`](Status::Unchanged), [`SolverFailed`](Status::SolverFailed): the direction of u_ref, 0
+    ///   in components that a bound holds.
+    /// - [`Filtered`](Status::Filtered), [`Infeasible`](Status::Infeasible) and
+    ///   [`NoAuthority`](Status::NoAuthority): (8) with the active rows, those that hold back a row that cannot be
+    ///   met among them; rows given up or left out take no part. A single row that cannot be met: 0 in the
+    ///   components at their bounds, the direction of u_ref in the others.
+    /// - [`InvalidInput`](Status::InvalidInput), [`Singular`](Status::Singular) and
+    ///   [`WrongRelativeDegree`](Status::WrongRelativeDegree), where the input is a constant: all zero.
+    /// - [`NotArmed`](Status::NotArmed): the direction of u_ref, 0 in components that a bound holds; h as ever.
+    ///
+    /// Does not allocate where `out` has been used with this filter before. An answer that is not `None` says why the
+    /// derivative is not known; `out` then means nothing.
+    ///
+    /// # Errors
+    ///
+    /// A slice of the wrong length; a direction that is not finite.
+    ///
+    /// ```
+    /// # use punctual_core::{barriers::DistanceDisc, filter::*, lie::Direction};
+    /// # use punctual_reference::plants::PointMass;
+    /// let mut filter = Filter::builder(4, 2)
+    ///     .barrier("goal", PointMass, DistanceDisc::new([45.0, 0.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
+    ///     .build()?;
+    /// let mut derivative = SampleDerivative::default();
+    /// // Wanted sideways: the row, which is on the x axis, lets it pass. Wanted forwards: it makes up for it.
+    /// for (du_ref, wanted) in [([0.0, 1.0], [0.0, 1.0]), ([1.0, 0.0], [0.0, 0.0])] {
+    ///     let direction = Direction { x: &[0.0; 4], u: &du_ref };
+    ///     let unknown =
+    ///         filter.differentiate(0.0, &[0.0; 4], &[0.0; 2], direction, &mut derivative)?;
+    ///     assert_eq!(unknown, None);
+    ///     // Over the period of a tenth of a second the disc is a little round.
+    ///     assert!((0..2).all(|i| (derivative.u[i] - wanted[i]).abs() < 1e-3), "{:?}", derivative.u);
+    /// }
+    /// # Ok::<(), punctual_core::Error>(())
+    /// ```
+    pub fn differentiate(
+        &mut self,
+        t: f64,
+        x: &[f64],
+        u_ref: &[f64],
+        direction: Direction,
+        out: &mut SampleDerivative,
+    ) -> Result<Option<NoDerivative>, Error> {
+        let hold = self.hold(t)?;
+        #[cfg(feature = "plan")]
+        let inside = match &self.backup {
+            None => [0.0; MAX_INPUTS],
+            Some(_) => {
+                let mut u = [0.0; MAX_INPUTS];
+                let inputs = self.rows.input_dim;
+                self.sample(t, x, u_ref, &mut u[..inputs])?;
+                self.backup.as_mut().and_then(|backup| backup.forget()).unwrap_or(u)
+            }
+        };
+        let Self { rows, integrator, .. } = self;
+        let unknown = match integrator {
+            None => rows.differentiate(t, x, u_ref, direction, out),
+            Some(own) => {
+                own.begin(rows, hold, x, u_ref)?;
+                own.begin_direction(rows, hold, direction)?;
+                let ([x, dx], [u_ref, du_ref]) = (&own.x, &own.u_ref);
+                rows.differentiate(t, x, u_ref, Direction { x: dx, u: du_ref }, out)
+            }
+        }?;
+        #[cfg(feature = "plan")]
+        if let Some(backup) = self.backup.as_ref().filter(|_| unknown.is_none()) {
+            let of = (&*rows, integrator.as_ref());
+            let carried = backup.carry(of, (t, hold), (x, u_ref), &inside, direction, out);
+            if carried.is_some() {
+                return Ok(carried);
+            }
+        }
+        if let Some(own) = integrator {
+            out.u[own.of.input] *= hold / 2.0;
+        }
+        Ok(unknown)
+    }
+
+    /// Forgets the anchors: the next sample with valid inputs starts every deadline again. An integrated input stays. The time until the
+    /// filter is [armed](FilterBuilder::arm_after) counts from its first sample all the same.
+    ///
+    /// With plans the next valid sample decides what is promised. If it finds no other plan, the one at hand is followed as long as
+    /// it keeps what is promised then; and where x is not finite, it is followed until there is a valid sample. A set that x
+    /// is inside of then is to be kept from there on, also one that was to be left once more before its deadline.
     pub fn rearm(&mut self) {
-        self.state.barriers.fill(FixedTimeState::default());
-        (self.state.time, self.state.period, self.state.bends) = (None, None, [None; 2]);
-        self.state.input.fill(0.0);
+        let state = &mut self.rows.state;
+        state.barriers.fill(FixedTimeState::default());
+        (state.time, state.period, state.bends) = (None, None, [None; 2]);
+        state.input.fill(0.0);
+        #[cfg(feature = "plan")]
+        if let Some(backup) = &mut self.backup {
+            state.plan.rearm();
+            backup.restart(&state.plan);
+        }
     }
 
     /// The memory of the filter between samples.
     pub fn state(&self) -> &FilterState {
-        &self.state
+        &self.rows.state
     }
 
-    /// Restores a state that [`Self::state`] returned: the filter goes on exactly as it would have then. The numbers of a
-    /// state from elsewhere are taken as they are. Wrong ones break promises; the input stays finite and within its bounds.
+    /// Restores a state that [`Self::state`] returned: the filter goes on exactly as it would have then. Rows take the numbers of a
+    /// state from elsewhere as they are: wrong ones break promises, but the input stays finite and within its bounds. Plans are
+    /// checked.
     ///
     /// # Errors
     ///
-    /// A state with another number of barriers.
+    /// A state with another number of barriers; a plan of another filter, or one that is damaged.
     pub fn restore(&mut self, state: &FilterState) -> Result<(), Error> {
-        length("barriers", state.barriers.len(), self.slots.len())?;
-        self.state.clone_from(state);
+        length("barriers", state.barriers.len(), self.rows.slots.len())?;
+        #[cfg(feature = "plan")]
+        if let Some(backup) = &self.backup {
+            backup.check(&self.rows, state)?;
+        }
+        self.rows.state.clone_from(state);
+        let integrated = self.integrator.as_ref().map_or(0.0, |own| own.limited(state.integrated));
+        self.rows.state.integrated = integrated;
+        #[cfg(feature = "plan")]
+        if let Some(backup) = &mut self.backup {
+            backup.restart(&self.rows.state.plan);
+        }
         Ok(())
     }
 
-    /// The report of the last [`Self::step`] or [`Self::peek`].
+    /// The report of the last [`Self::step`] or [`Self::peek`], on the input that it returned.
     pub fn report(&self) -> &Report {
-        &self.workspace.report
+        &self.rows.workspace.report
     }
 
-    /// The residuals of `u`, the answer of the last [`Self::step`] or [`Self::peek`] to `u_ref`, in the conditions of
-    /// optimality of its QP. They are small multiples of 1e-16 for a pointwise step. Where the step looked over the
-    /// period ([`Report::predicted`]) they are of the rows linearised at `u`, and up to the 1e-9 at which the search
-    /// stops. `None` where no QP was solved. Costs another solve: a check, not for every step.
-    ///
-    /// # Errors
-    ///
-    /// A slice of the wrong length.
-    pub fn residuals(&mut self, u_ref: &[f64], u: &[f64]) -> Result<Option<Residuals>, Error> {
-        length("u_ref", u_ref.len(), self.input_dim)?;
-        length("u", u.len(), self.input_dim)?;
-        let Workspace { rows, enforcement, requirements, report, qp, .. } = &mut self.workspace;
-        if report.status.is_abstention() || report.time.is_nan() {
-            return Ok(None);
+    /// The number of the input that is integrated, if one is.
+    pub fn integrated_input(&self) -> Option<usize> {
+        self.integrator.as_ref().map(|own| own.of.input)
+    }
+
+    /// The integrated input at the end of the last step, in its unit; 0 where none is integrated.
+    pub fn integrated(&self) -> f64 {
+        self.rows.state.integrated
+    }
+
+    /// What [`Self::integrated`] would be after the sample of the last [`Self::peek`].
+    pub fn next_integrated(&self) -> f64 {
+        self.rows.workspace.next.integrated
+    }
+
+    /// Sets the [integrated input](Self::integrated), to the nearest within its limits. Nothing where none is integrated.
+    pub fn set_integrated(&mut self, value: f64) {
+        let Some(own) = &self.integrator else { return };
+        self.rows.state.integrated = own.limited(value);
+        #[cfg(feature = "plan")]
+        if let Some(backup) = &mut self.backup {
+            backup.forget();
         }
-        let count = requirements.len().max(self.slots.len());
-        let problem = Problem {
-            enforcement: &enforcement[..count],
-            ..Problem::new(&rows[..count], &self.bounds, u_ref, self.correction_limit)
-        };
-        qp.solve(&problem, &mut [0.0; MAX_INPUTS][..u.len()]);
-        Ok(Some(qp.residuals(&problem, u)))
-    }
-
-    /// The names of the barriers, in the order of the report.
-    pub fn barrier_names(&self) -> impl Iterator<Item = &str> {
-        self.slots.iter().map(|slot| slot.name.as_str())
     }
 
     /// Gives barrier number `index` a new deadline in s, finite, > 0, that counts from the next sample. Its promise
-    /// starts anew there, from the derivatives that h then has. Until then the input of the last sample keeps the old
+    /// starts again there, from the derivatives that h then has. Until then the input of the last sample keeps the old
     /// promise, and the new profile starts with a zero error: no guarantee has a gap.
     ///
     /// # Errors
     ///
-    /// No such barrier; a deadline out of range.
+    /// No such barrier; a deadline out of range; a filter with plans.
     pub fn set_deadline(&mut self, index: usize, deadline: f64) -> Result<(), Error> {
-        let slot = self.slot(index)?;
+        let slot = self.replaced("deadline", index)?;
         let named = |e: Error| e.within(&slot.name);
         slot.promise = slot.promise.clone().with_deadline(deadline).map_err(named)?;
         slot.begin = Begin::AtOnce;
-        self.state.barriers[index] = FixedTimeState::default();
+        self.rows.state.barriers[index] = FixedTimeState::default();
         Ok(())
     }
 
-    /// Replaces the set of barrier number `index`, such as a goal that was moved: its promise starts anew
-    /// at the next sample, as with [`Self::set_deadline`].
+    /// Replaces the set of barrier number `index`, such as a goal that was moved: its promise starts again
+    /// at the next sample, as with [`Self::set_deadline`]. The source is along the model, with the integral of an
+    /// integrated input.
     ///
     /// # Errors
     ///
-    /// No such barrier; a source of other dimensions or another relative degree.
+    /// No such barrier; a source of other dimensions or another relative degree; a filter with plans.
     pub fn set_source(&mut self, index: usize, source: Box<dyn DerivativeSource>) -> Result<(), Error> {
-        let dims = (self.state_dim, self.input_dim);
-        let exact = self.errors.is_exact();
-        let slot = self.slot(index)?;
+        let dims = (self.rows.state_dim, self.rows.input_dim);
+        let exact = self.rows.errors.is_exact();
+        let slot = self.replaced("source", index)?;
         let named = |e: Error| e.within(&slot.name);
         if !exact {
-            errors::check(&*source).map_err(named)?;
+            rows::check_errors(&*source).map_err(named)?;
         }
         length("x", source.state_dim(), dims.0).map_err(named)?;
         length("u", source.input_dim(), dims.1).map_err(named)?;
@@ -318,38 +448,22 @@ impl SafetyFilter {
             return Err(named(Error::new(ErrorKind::RelativeDegree, "relative_degree", message)));
         }
         slot.source = source;
-        self.workspace.search.evaluations.plants = SharedPlants::of(&mut self.slots);
-        self.state.barriers[index] = FixedTimeState::default();
-        self.state.bends = [None; 2];
+        self.rows.workspace.search.evaluations.plants = SharedPlants::of(&mut self.rows.slots);
+        self.rows.state.barriers[index] = FixedTimeState::default();
+        self.rows.state.bends = [None; 2];
         Ok(())
     }
 
-    /// Sets the time in s, finite, > 0, for which the input of the next sample will be held; `None` where nobody
-    /// knows. It is for whoever is told, such as a co-simulation slave by the size of its step.
-    /// [`Sampling::Measured`] then goes by it at every sample. It is not part of [`Self::state`].
-    ///
-    /// # Errors
-    ///
-    /// A time out of range.
-    pub fn expect_hold(&mut self, hold: Option<f64>) -> Result<(), Error> {
-        self.expected = hold.map(|hold| positive("hold", hold)).transpose()?;
-        Ok(())
-    }
-
-    fn slot(&mut self, index: usize) -> Result<&mut BarrierSlot, Error> {
-        let count = self.slots.len();
+    /// Barrier number `index`, whose `field` is to be replaced.
+    fn replaced(&mut self, field: &str, index: usize) -> Result<&mut BarrierSlot, Error> {
+        #[cfg(feature = "plan")]
+        if self.backup.is_some() {
+            let message = "cannot be replaced where plans are followed: what is promised was decided with it; build another filter";
+            return Err(Error::new(ErrorKind::Unsupported, field, message));
+        }
+        let _ = field;
+        let count = self.rows.slots.len();
         let message = || format!("is {index}, must be < {count}, the number of barriers");
-        self.slots.get_mut(index).ok_or_else(|| Error::new(ErrorKind::Range, "barrier", message()))
-    }
-
-    /// The reason why barrier `index` goes by another method than the configured one since its anchor
-    /// ([`BarrierReport::fallback`]); `None` where it does not. Computed anew: not for every step.
-    pub fn refusal(&self, index: usize) -> Option<Refusal> {
-        self.slots.get(index)?.promise.refusal(self.state.barriers.get(index)?)
-    }
-
-    /// The relative degree of each barrier, in the order of the report.
-    pub fn relative_degrees(&self) -> impl Iterator<Item = usize> + '_ {
-        self.slots.iter().map(|slot| slot.source.relative_degree())
+        self.rows.slots.get_mut(index).ok_or_else(|| Error::new(ErrorKind::Range, "barrier", message()))
     }
 }

@@ -1,11 +1,13 @@
 //! Questions to a filter between its samples; it remembers none of them.
 
-use super::SafetyFilter;
+use super::rows::Workspace;
+use super::{Filter, Refusal};
 use crate::error::{Error, length, non_negative, positive};
 use crate::lie::Derivatives;
-use crate::reach;
+use crate::qp::{Problem, Residuals};
+use crate::{MAX_INPUTS, reach};
 
-impl SafetyFilter {
+impl Filter {
     /// A time in s before which no input within the bounds brings barrier number `index` to h ≥ 0 from the
     /// state `x` at `t` ([`reach::soonest`]), at most `horizon` (s, finite, > 0); `None` where that is not
     /// known (with a disturbance too) or there is no such barrier.
@@ -13,11 +15,17 @@ impl SafetyFilter {
     /// # Errors
     ///
     /// A slice of the wrong length; a horizon out of range.
-    pub fn soonest(&self, index: usize, t: f64, x: &[f64], horizon: f64) -> Result<Option<f64>, Error> {
-        length("x", x.len(), self.state_dim)?;
+    pub fn earliest_arrival(
+        &self,
+        index: usize,
+        t: f64,
+        x: &[f64],
+        horizon: f64,
+    ) -> Result<Option<f64>, Error> {
+        length("x", x.len(), self.rows.state_dim)?;
         let horizon = positive("horizon", horizon)?;
-        let slot = self.slots.get(index).filter(|c| c.is_undisturbed());
-        Ok(slot.and_then(|c| reach::soonest(&*c.source, (t, x), &self.bounds, horizon)))
+        let slot = self.rows.slots.get(index).filter(|c| c.is_undisturbed());
+        Ok(slot.and_then(|c| reach::soonest(&*c.source, (t, x), &self.rows.bounds, horizon)))
     }
 
     /// Whether the input bounds certainly do not allow h ≥ 0 of barrier number `index` at `after` s, finite, ≥ 0,
@@ -27,10 +35,9 @@ impl SafetyFilter {
     ///
     /// A slice of the wrong length; a time out of range.
     pub fn is_ruled_out(&self, index: usize, t: f64, x: &[f64], after: f64) -> Result<bool, Error> {
-        length("x", x.len(), self.state_dim)?;
+        length("x", x.len(), self.rows.state_dim)?;
         let after = non_negative("after", after)?;
-        let slot = self.slots.get(index).filter(|c| c.is_undisturbed());
-        Ok(slot.is_some_and(|c| reach::ruled_out(&*c.source, (t, x), &self.bounds, after, 1.0)))
+        Ok(self.rows.is_ruled_out(index, (t, x), after))
     }
 
     /// h of each barrier at time `t` (s) and the state `x`, written to `h` in the order of the report: for instants
@@ -40,13 +47,53 @@ impl SafetyFilter {
     ///
     /// A slice of the wrong length.
     pub fn barrier_values(&self, t: f64, x: &[f64], h: &mut [f64]) -> Result<(), Error> {
-        length("x", x.len(), self.state_dim)?;
-        length("h", h.len(), self.slots.len())?;
+        length("x", x.len(), self.rows.state_dim)?;
+        length("h", h.len(), self.rows.slots.len())?;
         let mut derivatives = Derivatives::ZERO;
-        for (slot, h) in self.slots.iter().zip(h) {
+        for (slot, h) in self.rows.slots.iter().zip(h) {
             slot.source.evaluate(t, x, &mut derivatives);
             *h = derivatives.drift[0];
         }
         Ok(())
+    }
+
+    /// The residuals of `u`, the answer of the last [`Self::step`] or [`Self::peek`] to `u_ref`, in the conditions of
+    /// optimality of its QP. They are small multiples of 1e-16 for a pointwise step. Where the step looked over the
+    /// period ([`Report::predicted`]) they are of the rows linearised at `u`, and up to the 1e-9 at which the search
+    /// stops. `None` where no QP was solved. Costs another solve: a check, not for every step.
+    ///
+    /// # Errors
+    ///
+    /// A slice of the wrong length.
+    pub fn residuals(&mut self, u_ref: &[f64], u: &[f64]) -> Result<Option<Residuals>, Error> {
+        length("u_ref", u_ref.len(), self.rows.input_dim)?;
+        length("u", u.len(), self.rows.input_dim)?;
+        let Workspace { rows, enforcement, requirements, report, qp, .. } = &mut self.rows.workspace;
+        if report.status.is_abstention() || report.time.is_nan() {
+            return Ok(None);
+        }
+        let count = requirements.len().max(self.rows.slots.len());
+        let problem = Problem {
+            enforcement: &enforcement[..count],
+            ..Problem::new(&rows[..count], &self.rows.bounds, u_ref, self.rows.correction_limit)
+        };
+        qp.solve(&problem, &mut [0.0; MAX_INPUTS][..u.len()]);
+        Ok(Some(qp.residuals(&problem, u)))
+    }
+
+    /// The names of the barriers, in the order of the report.
+    pub fn barrier_names(&self) -> impl Iterator<Item = &str> {
+        self.rows.slots.iter().map(|slot| slot.name.as_str())
+    }
+
+    /// The reason why barrier `index` goes by another method than the configured one since its anchor
+    /// ([`BarrierReport::fallback`]); `None` where it does not. Computed anew: not for every step.
+    pub fn refusal(&self, index: usize) -> Option<Refusal> {
+        self.rows.slots.get(index)?.promise.refusal(self.rows.state.barriers.get(index)?)
+    }
+
+    /// The relative degree of each barrier, in the order of the report.
+    pub fn relative_degrees(&self) -> impl Iterator<Item = usize> + '_ {
+        self.rows.slots.iter().map(|slot| slot.source.relative_degree())
     }
 }

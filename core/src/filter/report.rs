@@ -41,7 +41,7 @@ pub enum Status {
     /// The solver for several rows did not converge: u_ref within its bounds.
     SolverFailed = 7,
     /// The constraints are not met, or lead where no way on is left, and a plan that keeps every promise decides. Only
-    /// from a filter that follows plans (`AssuredFilter`).
+    /// from a filter that follows plans ([`Filter::with_plans`](super::Filter::with_plans)).
     Backup = 8,
     /// The filter is [not armed](super::FilterBuilder::arm_after) yet: nothing is asked or promised, u_ref within its bounds.
     NotArmed = 9,
@@ -136,7 +136,7 @@ pub struct BarrierReport {
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub arrival_time: Option<f64>,
     /// Whether a witness is in hand: a plan, checked in the model, that keeps this barrier's promise within the bounds
-    /// whatever u_ref is. Only from a filter that follows plans (`AssuredFilter`).
+    /// whatever u_ref is. Only from a filter that follows plans ([`Filter::with_plans`](super::Filter::with_plans)).
     pub guaranteed: bool,
     /// Whether the theorem behind the present phase applies: its conditions held at a sample of this phase, and every step
     /// since then was satisfied. It does not say that an input will exist at later samples.
@@ -146,7 +146,7 @@ pub struct BarrierReport {
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub margin: f64,
     /// Whether the configured method could not be used from the anchor and another took its place
-    /// ([`SafetyFilter::refusal`](super::SafetyFilter::refusal) says why).
+    /// ([`Filter::refusal`](super::Filter::refusal) says why).
     pub fallback: bool,
     /// Number of times that leaving the set has re-armed the deadline (the settings' `recovery`).
     pub recoveries: u32,
@@ -273,6 +273,9 @@ pub struct Report {
     pub predicted: bool,
     /// One entry per barrier, in the order they were added.
     pub barriers: Vec<BarrierReport>,
+    /// Whether the promises are kept, who chose the input and why; `None` from a filter without plans.
+    #[cfg(feature = "plan")]
+    pub assurance: Option<super::Assurance>,
 }
 
 impl Report {
@@ -285,7 +288,15 @@ impl Report {
             period: 0.0,
             predicted: false,
             barriers: vec![BarrierReport::BLANK; barriers],
+            #[cfg(feature = "plan")]
+            assurance: None,
         }
+    }
+
+    /// Whether a plan keeps every promise, whatever u_ref is.
+    #[cfg(feature = "plan")]
+    pub fn is_assured(&self) -> bool {
+        self.assurance.is_some_and(|assurance| assurance.is_assured())
     }
 
     /// The numbers of the barriers whose constraints this step does not meet.

@@ -18,7 +18,7 @@ pub enum Sampling {
     /// The constraint is enforced over the period since the step before, taken as the next one's length, or over a
     /// longer one that was seen not long ago. A period is forgotten within a hundred of its length, so a very short
     /// step between long ones changes nothing. After a gap the period at most doubles from step to step. Where
-    /// somebody says how long the next one is ([`SafetyFilter::expect_hold`](super::SafetyFilter::expect_hold)), it
+    /// somebody says how long the next one is ([`Filter::expect_hold`](super::Filter::expect_hold)), it
     /// is that. The default.
     Measured {
         /// The period in s, finite, > 0, of the first step, before any is measured. Default: a hundredth

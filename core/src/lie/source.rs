@@ -15,7 +15,7 @@ use crate::interval::Interval;
 /// | method | for |
 /// |---|---|
 /// | [`predict`](Self::predict) | constraints over the sampling period ([`Sampling`](crate::filter::Sampling)), delayed inputs |
-/// | [`directional`](Self::directional) | [`SafetyFilter::differentiate`](crate::filter::SafetyFilter::differentiate) |
+/// | [`directional`](Self::directional) | [`Filter::differentiate`](crate::filter::Filter::differentiate) |
 /// | [`predict_directional`](Self::predict_directional) | the same over the sampling period, and errors of the measurement |
 /// | [`highest`](Self::highest) | deadlines that are lost ([`reach`](crate::reach)) |
 /// | [`shared`](Self::shared) | the speed of filters with several barriers along one plant |

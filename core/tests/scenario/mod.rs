@@ -5,7 +5,7 @@
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
 use punctual_core::dynamics::ControlAffine;
-use punctual_core::filter::{BarrierSettings, SafetyFilter};
+use punctual_core::filter::{BarrierSettings, Filter};
 use punctual_core::nalgebra::{SMatrix, SVector, vector};
 use punctual_core::scalar::Scalar;
 use punctual_reference::plants::PointMass;
@@ -43,19 +43,19 @@ pub(crate) fn distance_disc() -> DistanceDisc {
 }
 
 /// A filter with one barrier of relative degree 2, "goal".
-pub(crate) fn one<P, B>(plant: P, barrier: B, settings: BarrierSettings) -> SafetyFilter
+pub(crate) fn one<P, B>(plant: P, barrier: B, settings: BarrierSettings) -> Filter
 where
     P: ControlAffine<4, 2> + Send + 'static,
     B: Barrier<4> + Send + 'static,
 {
-    SafetyFilter::builder(4, 2)
+    Filter::builder(4, 2)
         .barrier("goal", plant, barrier, settings)
         .and_then(punctual_core::filter::FilterBuilder::build)
         .expect("valid filter")
 }
 
 /// The point mass and the distance-shaped disc.
-pub(crate) fn goal(settings: BarrierSettings) -> SafetyFilter {
+pub(crate) fn goal(settings: BarrierSettings) -> Filter {
     one(PointMass, distance_disc(), settings)
 }
 

@@ -1,13 +1,14 @@
 //! A filter: it samples its inputs and remembers its promises.
 
-use punctual_core::filter::{BarrierReport, NoDerivative, SampleDerivative, Standing, Status};
+use punctual_core::filter::{
+    BarrierReport, Filter, FilterState, NoDerivative, SampleDerivative, Standing, Status,
+};
 use punctual_core::lie::Direction;
 use punctual_core::plan::Failure;
 
 use super::{Block, BlockState, Values, in_words};
 use crate::configuration::{ConfigurationError, FilterConfiguration, Parameter, UNBOUNDED, updated};
 use crate::product::{BARRIER_OUTPUTS, Layout, Product, Reading};
-use crate::{FilterLoop, LoopState};
 
 pub(super) struct FilterBlock {
     configuration: FilterConfiguration,
@@ -15,13 +16,13 @@ pub(super) struct FilterBlock {
     layout: Layout,
     /// The outputs that are enumerations; their codes follow the parameters.
     enumerated: Vec<usize>,
-    filter: FilterLoop,
+    filter: Filter,
     /// `rearm` at the last step: a rising edge re-arms.
     rearm_seen: bool,
     /// The standing of the promise that was last spoken of.
     noticed: Option<Standing>,
     /// Scratch: the state to go back to after looking ahead over a re-arming.
-    kept: LoopState,
+    kept: FilterState,
     /// Scratch: the derivative of a sample.
     change: SampleDerivative,
 }
@@ -33,7 +34,7 @@ impl FilterBlock {
     ) -> Result<Self, ConfigurationError> {
         let (layout, enumerated) = (product.layout, product.enumerated().collect());
         let (parameters, filter) = (configuration.parameters(), configuration.build_loop()?);
-        let kept = filter.state();
+        let kept = filter.state().clone();
         let change = SampleDerivative::default();
         let noticed = None;
         let rearm_seen = false;
@@ -60,7 +61,7 @@ impl FilterBlock {
     fn rearm(&mut self, values: &Values) -> bool {
         let rising = values.booleans[self.rearm_index()] && !self.rearm_seen;
         if rising {
-            self.filter.save(&mut self.kept);
+            self.kept.clone_from(self.filter.state());
             self.filter.rearm();
         }
         rising
@@ -71,11 +72,19 @@ impl FilterBlock {
         self.filter.last_hold().unwrap_or(self.configuration.experiment.step_size)
     }
 
+    /// Has the filter know for how long in s, > 0, the input of the next sample is held, where it counts with that.
+    fn expect(&mut self, hold: f64) -> Result<(), punctual_core::Error> {
+        if self.filter.counts_holds() { self.filter.expect_hold(Some(hold)) } else { Ok(()) }
+    }
+
     /// Where the promise stands, where plans are followed. They are not where a parameter that was set since asks for what
     /// none accounts for.
     fn standing(&self) -> Option<(Standing, Option<Failure>)> {
         let refused = (Standing::Refused, None);
-        self.configuration.is_assured().then(|| self.filter.standing().unwrap_or(refused))
+        let assurance = self.filter.assurance();
+        self.configuration
+            .is_assured()
+            .then(|| assurance.map_or(refused, |assurance| (assurance.standing, assurance.failure)))
     }
 
     /// The number of the output after those of the barriers.
@@ -94,9 +103,17 @@ impl FilterBlock {
     fn write_standing(&self, standing: Standing, t: f64, values: &mut Values) {
         let at = self.after_barriers();
         values.integers[at] = standing as i32;
-        values.integers[at + 1] = self.filter.reason().map_or(0, |reason| reason.barrier as i32 + 1);
+        values.integers[at + 1] = self
+            .filter
+            .assurance()
+            .and_then(|assurance| assurance.reason)
+            .map_or(0, |reason| reason.barrier as i32 + 1);
         if self.configuration.ends_plans() {
-            values.reals[at + 2] = self.filter.assured_until().map_or(t, |until| until.min(UNBOUNDED));
+            values.reals[at + 2] = self
+                .filter
+                .assurance()
+                .and_then(|assurance| assurance.until)
+                .map_or(t, |until| until.min(UNBOUNDED));
         }
     }
 
@@ -110,7 +127,7 @@ impl FilterBlock {
     /// The reason why there is no derivative, with the barrier by its name.
     fn named(&self, reason: NoDerivative) -> String {
         let barrier = match reason {
-            NoDerivative::Source(i) | NoDerivative::Profile(i) => self.filter.filter().barrier_names().nth(i),
+            NoDerivative::Source(i) | NoDerivative::Profile(i) => self.filter.barrier_names().nth(i),
             _ => None,
         };
         match barrier {
@@ -121,7 +138,7 @@ impl FilterBlock {
 
     /// Writes the last sample to the outputs after the safe input, in the order of the variable table.
     fn write(&self, t: f64, values: &mut Values, integrated: f64) {
-        let report = self.filter.filter().report();
+        let report = self.filter.report();
         let at = self.layout.outputs + self.layout.inputs;
         values.integers[at] = report.status as i32;
         write_barriers(&report.barriers, at + 1, values);
@@ -142,19 +159,20 @@ impl Block for FilterBlock {
         self.filter = configuration.build_loop()?;
         self.configuration = configuration;
         (self.rearm_seen, self.noticed) = (false, None);
-        self.filter.save(&mut self.kept);
+        self.kept.clone_from(self.filter.state());
         Ok(())
     }
 
     fn output(&mut self, t: f64, values: &mut Values) {
         let rising = self.rearm(values);
         let hold = self.hold();
+        let expected = self.expect(hold);
         let ([x, u_ref], u) = self.inputs_and_u(&mut values.reals);
         // The lengths are those of the filter by construction, since the table was built from it.
-        let peeked = self.filter.peek(t, hold, x, u_ref, u);
+        let peeked = expected.and_then(|()| self.filter.peek(t, x, u_ref, u).map(drop));
         debug_assert!(peeked.is_ok(), "{peeked:?}");
-        if let Ok(integrated) = peeked {
-            self.write(t, values, integrated);
+        if peeked.is_ok() {
+            self.write(t, values, self.filter.next_integrated());
         }
         if rising {
             let restored = self.filter.restore(&self.kept);
@@ -171,9 +189,11 @@ impl Block for FilterBlock {
     ) -> Result<(), String> {
         let rising = self.rearm(values);
         let hold = self.hold();
+        let expected = self.expect(hold);
         let ([x, u_ref], [dx, du_ref]) = (self.inputs(&values.reals), self.inputs(direction));
+        let direction = Direction { x: dx, u: du_ref };
         let unknown =
-            self.filter.differentiate(t, hold, x, u_ref, Direction { x: dx, u: du_ref }, &mut self.change);
+            expected.and_then(|()| self.filter.differentiate(t, x, u_ref, direction, &mut self.change));
         if rising {
             self.filter.restore(&self.kept).map_err(|e| e.to_string())?;
         }
@@ -202,9 +222,11 @@ impl Block for FilterBlock {
     fn step(&mut self, t: f64, h: f64, values: &mut Values) -> Result<(), String> {
         self.rearm(values);
         let hold = if h > 0.0 { h } else { self.hold() };
+        let expected = self.expect(hold);
         let ([x, u_ref], u) = self.inputs_and_u(&mut values.reals);
         let before = self.filter.integrated();
-        let stepped = self.filter.step(t, hold, x, u_ref, u).map(drop).map_err(|e| in_words(&e));
+        let stepped =
+            expected.and_then(|()| self.filter.step(t, x, u_ref, u).map(drop)).map_err(|e| in_words(&e));
         if h == 0.0 {
             self.filter.set_integrated(before);
         }
@@ -251,9 +273,9 @@ impl Block for FilterBlock {
         match state {
             BlockState::Filter { rearm_seen, memory } => {
                 *rearm_seen = *now;
-                filter.save(memory);
+                (**memory).clone_from(filter.state());
             }
-            _ => *state = BlockState::Filter { rearm_seen: *now, memory: Box::new(filter.state()) },
+            _ => *state = BlockState::Filter { rearm_seen: *now, memory: Box::new(filter.state().clone()) },
         }
     }
 
@@ -298,7 +320,7 @@ impl Block for FilterBlock {
             at += BARRIER_OUTPUTS.len();
         }
         if let Some((standing, _)) = self.standing() {
-            let shown = if self.filter.standing().is_some() { Standing::Undecided } else { standing };
+            let shown = if self.filter.assurance().is_some() { Standing::Undecided } else { standing };
             self.write_standing(shown, 0.0, values);
         }
         self.write_codes(values);

@@ -5,12 +5,12 @@ mod disturbance;
 mod filter;
 mod plant;
 
-use crate::LoopState;
 use crate::configuration::{Configuration, ConfigurationError};
 use crate::product::Product;
 use controller::ControllerBlock;
 use filter::FilterBlock;
 use plant::PlantBlock;
+use punctual_core::filter::FilterState;
 
 /// The values of all variables, each at the index of its value reference in the array of its type
 /// (the other two entries stay unused).
@@ -54,8 +54,8 @@ pub enum BlockState {
     Filter {
         /// `rearm` at the last step.
         rearm_seen: bool,
-        /// The memory of the loop.
-        memory: Box<LoopState>,
+        /// The memory of the filter.
+        memory: Box<FilterState>,
     },
     /// State of a plant.
     Plant {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use punctual_core::MAX_ROWS;
-use punctual_core::filter::{Begin, End, FilterBuilder, SafetyFilter, Sampling, Strictness};
+use punctual_core::filter::{Begin, End, Filter, FilterBuilder, Sampling, Strictness};
 use punctual_core::lie::RelativeDegree;
 use punctual_core::plan::Failure;
 use serde::{Deserialize, Serialize};
@@ -48,9 +48,9 @@ words! {
         /// A plan behind every input, where all inputs have bounds and plans account for everything; else the rows alone, with a
         /// warning where only the latter fails.
         Auto = "auto",
-        /// The rows alone ([`SafetyFilter`]).
+        /// The rows alone ([`Filter`]).
         Off = "off",
-        /// A plan behind every input ([`AssuredFilter`](punctual_core::filter::AssuredFilter)).
+        /// A plan behind every input ([`Filter`](punctual_core::filter::Filter)).
         On = "on",
     }
 }
@@ -140,7 +140,7 @@ pub struct FilterConfiguration {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plan_horizon: Option<f64>,
     /// The most quadratic programs of a search for a plan at one sample after the first, ≥ 1; `None`:
-    /// [`AssuredFilter::PROGRAMS`](punctual_core::filter::AssuredFilter::PROGRAMS).
+    /// [`Plans::SEARCH_BUDGET`](punctual_core::filter::Plans::SEARCH_BUDGET).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub search_budget: Option<u32>,
     /// Why no plan is followed, as the file stands; `None` where plans are.
@@ -445,7 +445,7 @@ impl FilterConfiguration {
             }
         }
         let filter = configuration.build_loop()?;
-        configuration.check_margins(filter.filter())?;
+        configuration.check_margins(&filter)?;
         if *configuration.run != RunSection::default() {
             configuration.alone()?;
         }
@@ -494,7 +494,7 @@ impl FilterConfiguration {
     }
 
     /// Refuses a margin that h never has. It checks shapes whose largest h is known, at their centre or at rest.
-    fn check_margins(&self, filter: &SafetyFilter) -> Result<(), ConfigurationError> {
+    fn check_margins(&self, filter: &Filter) -> Result<(), ConfigurationError> {
         let states = self.plant.states().len();
         let mut x = vec![0.0; states];
         x.extend(self.barrier_inputs().iter().map(|input| input.start));
@@ -576,7 +576,7 @@ impl FilterConfiguration {
     /// # Errors
     ///
     /// A number outside its range, or a lower input bound above its upper bound.
-    pub fn build(&self) -> Result<SafetyFilter, ConfigurationError> {
+    pub fn build(&self) -> Result<Filter, ConfigurationError> {
         self.built(if self.is_assured() { Uneven::Taken } else { Uneven::Refused })
     }
 
@@ -590,11 +590,11 @@ impl FilterConfiguration {
     }
 
     /// The filter, with what becomes of barriers whose inputs enter at different orders.
-    pub(super) fn built(&self, mut uneven: Uneven<'_>) -> Result<SafetyFilter, ConfigurationError> {
+    pub(super) fn built(&self, mut uneven: Uneven<'_>) -> Result<Filter, ConfigurationError> {
         let inputs = self.plant.inputs();
         let states = self.plant.states().len();
         let mut next_point = states;
-        let mut builder = SafetyFilter::builder(states + self.barrier_inputs().len(), inputs.len());
+        let mut builder = Filter::builder(states + self.barrier_inputs().len(), inputs.len());
         // The barriers, each with its window and its strictness.
         for (i, section) in self.barrier.iter().enumerate() {
             let first = next_point;

@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 
-use punctual_core::filter::{AssuredFilter, IntegratedFilter, Integration, Pace, SafetyFilter};
+use punctual_core::filter::{Filter, Integration, Plans};
 use punctual_models::mentions;
 use serde::{Deserialize, Serialize};
 
@@ -16,10 +16,9 @@ use super::key::{
 use super::{
     ConfigurationError, FilterConfiguration, Parameter, PlantSection, Range, UNBOUNDED, VariableSection,
 };
-use crate::FilterLoop;
 
 /// `[integrator]`: dynamic extension inside the filter. The plant outside has this state of the filter's model for its
-/// input; the filter solves for its rate and integrates that itself ([`IntegratedFilter`]).
+/// input; the filter solves for its rate and integrates that itself ([`Filter`]).
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct IntegratorSection {
@@ -168,10 +167,10 @@ impl FilterConfiguration {
     /// # Errors
     ///
     /// A number out of range, or numbers that contradict each other.
-    pub fn build_loop(&self) -> Result<FilterLoop, ConfigurationError> {
+    pub fn build_loop(&self) -> Result<Filter, ConfigurationError> {
         if self.is_assured() {
             match self.assured(self.build()?) {
-                Ok(filter) => return Ok(FilterLoop::Assured(Box::new(filter))),
+                Ok(filter) => return Ok(filter),
                 Err(reason) if self.assurance == AssuranceName::On => {
                     let message = format!("is \"on\", must be \"off\": {reason}");
                     return Err(ConfigurationError::new("assurance", message));
@@ -183,17 +182,13 @@ impl FilterConfiguration {
         // Rows alone need every input in the same derivative.
         let filter = self.built(Uneven::Refused)?;
         match &self.integrator {
-            None => Ok(FilterLoop::Plain(filter)),
-            Some(section) => self.integrated(filter, section).map(FilterLoop::Integrated),
+            None => Ok(filter),
+            Some(section) => self.integrated(filter, section),
         }
     }
 
     /// `filter` behind its integrator.
-    fn integrated(
-        &self,
-        filter: SafetyFilter,
-        section: &IntegratorSection,
-    ) -> Result<IntegratedFilter, ConfigurationError> {
+    fn integrated(&self, filter: Filter, section: &IntegratorSection) -> Result<Filter, ConfigurationError> {
         let refused = |e: punctual_core::Error| {
             let field = match e.field() {
                 "limits" => "integrator.min, integrator.max",
@@ -204,15 +199,19 @@ impl FilterConfiguration {
         };
         let (state, input) = section.place(&self.plant)?;
         let of = Integration { state, input, limits: section.limits(), gain: section.gain };
-        IntegratedFilter::new(filter, of).map_err(refused)
+        filter.with_integrator(of).map_err(refused)
     }
 
-    fn pace(&self) -> Pace {
-        Pace { period: self.experiment.step_size, horizon: self.plan_horizon }
+    /// How plans are made, but for a policy.
+    fn plans(&self) -> Plans {
+        Plans::every(self.experiment.step_size)
+            .horizon(self.plan_horizon)
+            .search_budget(self.search_budget.unwrap_or(Plans::SEARCH_BUDGET))
+            .apart(self.apart())
     }
 
     /// What keeps plans from being put behind `filter`, built from this configuration: each with its key, in words.
-    pub(super) fn obstacles_of(&self, filter: &SafetyFilter) -> Vec<String> {
+    pub(super) fn obstacles_of(&self, filter: &Filter) -> Vec<String> {
         if let Some(barrier) = self.external() {
             return vec![format!("barrier {} has no model to run ahead", barrier.name)];
         }
@@ -221,7 +220,7 @@ impl FilterConfiguration {
         if let Some(input) = follows.first() {
             found.push(format!("a barrier follows {}, which others move and no plan foresees", input.name));
         }
-        for error in AssuredFilter::obstacles(filter, self.pace()) {
+        for error in filter.obstacles(&self.plans()) {
             let (field, message) = (error.field(), error.message());
             let of = |key: &str| {
                 let name = field.strip_suffix(key)?.strip_suffix('.')?;
@@ -252,28 +251,24 @@ impl FilterConfiguration {
     /// # Errors
     ///
     /// What no plan accounts for yet, in words.
-    pub fn assured(&self, filter: SafetyFilter) -> Result<AssuredFilter, String> {
+    pub fn assured(&self, filter: Filter) -> Result<Filter, String> {
         let obstacles = self.obstacles_of(&filter);
         if !obstacles.is_empty() {
             return Err(listed(&obstacles));
         }
-        let pace = self.pace();
-        let assured = match &self.integrator {
-            None => AssuredFilter::new(filter, pace),
-            Some(section) => {
-                let integrated = self.integrated(filter, section).map_err(|e| e.to_string())?;
-                AssuredFilter::integrated(integrated, pace)
-            }
+        let mut plans = self.plans();
+        if let Some(policy) = &self.policy {
+            let functions = self.plant.functions("policy", policy).map_err(|e| e.to_string())?;
+            let functions = RefCell::new(functions);
+            plans = plans.policy(move |t: f64, x: &[f64], u: &mut [f64]| {
+                let values = &mut *functions.borrow_mut();
+                u.iter_mut().zip(values.at(t, |i| x[i])).for_each(|(u, value)| *u = value);
+            });
         }
-        .map_err(|e| e.to_string())?;
-        let programs = self.search_budget.unwrap_or(AssuredFilter::PROGRAMS);
-        let assured = assured.apart(self.apart()).search_budget(programs).map_err(|e| e.to_string())?;
-        let Some(policy) = &self.policy else { return Ok(assured) };
-        let functions = self.plant.functions("policy", policy).map_err(|e| e.to_string())?;
-        let functions = RefCell::new(functions);
-        Ok(assured.policy(move |t: f64, x: &[f64], u: &mut [f64]| {
-            let values = &mut *functions.borrow_mut();
-            u.iter_mut().zip(values.at(t, |i| x[i])).for_each(|(u, value)| *u = value);
-        }))
+        let filter = match &self.integrator {
+            None => filter,
+            Some(section) => self.integrated(filter, section).map_err(|e| e.to_string())?,
+        };
+        filter.with_plans(plans).map_err(|e| e.to_string())
     }
 }

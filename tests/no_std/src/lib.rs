@@ -9,7 +9,7 @@ use alloc::boxed::Box;
 use punctual_core::Error;
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::ControlAffine;
-use punctual_core::filter::{BarrierSettings, SafetyFilter, Status};
+use punctual_core::filter::{BarrierSettings, Filter, Status};
 use punctual_core::nalgebra::{SMatrix, SVector};
 use punctual_core::scalar::Scalar;
 
@@ -36,9 +36,9 @@ impl ControlAffine<4, 2> for PointMass {
 /// # Errors
 ///
 /// None: the numbers are in range.
-pub fn filter() -> Result<Box<SafetyFilter>, Error> {
+pub fn filter() -> Result<Box<Filter>, Error> {
     let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
-    let mut filter = SafetyFilter::builder(4, 2)
+    let mut filter = Filter::builder(4, 2)
         .barrier("goal", PointMass, goal, BarrierSettings::within(10.0))?
         .bounds(&[-4.0, -4.0], &[4.0, 4.0])?
         .build()?;
@@ -51,6 +51,6 @@ pub fn filter() -> Result<Box<SafetyFilter>, Error> {
 /// # Errors
 ///
 /// None: the lengths are right.
-pub fn step(filter: &mut SafetyFilter, t: f64, x: &[f64; 4], u: &mut [f64; 2]) -> Result<Status, Error> {
+pub fn step(filter: &mut Filter, t: f64, x: &[f64; 4], u: &mut [f64; 2]) -> Result<Status, Error> {
     Ok(filter.step(t, x, &[0.0; 2], u)?.status)
 }

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use punctual_core::filter::{AssuredFilter, Driver, Standing};
+use punctual_core::filter::{Driver, Standing};
 use punctual_reference::plants::Unicycle;
 
 use super::cases;
@@ -37,8 +37,7 @@ fn times(obstacles: bool, steps: usize) -> (Vec<f64>, Vec<f64>, usize, usize) {
         case.bounds = [8.0, 3.0];
         case.reference = [Reference::Damping(1.0), Reference::Random { size, held: 1.0 }][number % 2];
         let mut filter = match obstacles {
-            true => AssuredFilter::new(filter(&Unicycle, case.bounds), STEP)
-                .expect("a filter that can be assured"),
+            true => filter(&Unicycle, case.bounds).with_plans(STEP).expect("a filter that can be assured"),
             false => case.assured(),
         };
         let end = if obstacles { 2.0 * END } else { END };
@@ -49,7 +48,8 @@ fn times(obstacles: bool, steps: usize) -> (Vec<f64>, Vec<f64>, usize, usize) {
             let (t, mut u) = (k as f64 * STEP, [0.0; 2]);
             let wanted = case.wanted(t, &x, &mut drawn, &mut numbers);
             let clock = Instant::now();
-            let assurance = *filter.step(t, &x[..4], &wanted, &mut u).expect("right dimensions");
+            let assurance =
+                filter.step(t, &x[..4], &wanted, &mut u).expect("right dimensions").assurance.expect("plans");
             let taken = clock.elapsed().as_secs_f64();
             if assurance.standing != Standing::Assured {
                 searches += 1;
@@ -59,7 +59,7 @@ fn times(obstacles: bool, steps: usize) -> (Vec<f64>, Vec<f64>, usize, usize) {
             // A search shows as the plan's, by other laws than those before.
             if k == 0 || assurance.driver == Driver::Plan {
                 let laws =
-                    serde_json::to_value(filter.commitment()).expect("serialises")["plan"]["reference"]
+                    serde_json::to_value(&filter.state().plan).expect("serialises")["plan"]["reference"]
                         .take();
                 searches += usize::from(plan.as_ref() != Some(&laws) && (plan.is_some() || k == 0));
                 plan = Some(laws);

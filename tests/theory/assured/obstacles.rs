@@ -1,7 +1,7 @@
 //! Through ten obstacles with a witness: what is accepted is on time, kept and clear of all, and never infeasible.
 
 use punctual_core::dynamics::{ControlAffine, rk4_step};
-use punctual_core::filter::{AssuredFilter, Driver, Status};
+use punctual_core::filter::{Driver, Status};
 use punctual_core::nalgebra::SVector;
 use punctual_core::plan::Failure;
 use punctual_reference::nominal::Heading;
@@ -41,7 +41,7 @@ fn run<P>(plant: &P, bounds: [f64; 2], nominal: Nominal, start: [f64; 4], driven
 where
     P: ControlAffine<4, 2> + Clone + Send + 'static,
 {
-    let mut filter = AssuredFilter::new(filter(plant, bounds), STEP).expect("a filter that can be assured");
+    let mut filter = filter(plant, bounds).with_plans(STEP).expect("a filter that can be assured");
     let heading = Heading { speed_limit: 6.0, ..Heading::towards(GOAL.0) };
     let mut x = SVector::from(start);
     let mut run = Run {
@@ -60,7 +60,11 @@ where
         let waypoint = heading.around([x[0], x[1]], &OBSTACLES, 1.0);
         let u_ref = nominal(waypoint, &x.into());
         let mut u = SVector::<f64, 2>::zeros();
-        let assurance = *filter.step(t, x.as_slice(), &u_ref, u.as_mut_slice()).expect("right dimensions");
+        let assurance = filter
+            .step(t, x.as_slice(), &u_ref, u.as_mut_slice())
+            .expect("right dimensions")
+            .assurance
+            .expect("plans");
         if k == 0 && !assurance.is_assured() {
             return Run { refused: assurance.failure, ..run };
         }

@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 use std::fs;
 
-use punctual_core::filter::AssuredFilter;
+use punctual_core::filter::Filter;
 use serde_json::{Value, json};
 
 use super::cases;
@@ -71,9 +71,10 @@ fn table_of_what_a_manoeuvre_can_do() {
     let count = cases(24, 400);
     let found = on_every_core(count, |i| {
         let case = draw(0x0b5e_0000 + i, i % 2 == 1);
-        let mut filter: AssuredFilter = case.assured();
+        let mut filter: Filter = case.assured();
         let assurance =
-            *filter.step(0.0, &case.start[..4], &[0.0; 2], &mut [0.0; 2]).expect("right dimensions");
+            filter.step(0.0, &case.start[..4], &[0.0; 2], &mut [0.0; 2]).expect("right dimensions");
+        let assurance = assurance.assurance.expect("plans");
         (case, assurance)
     });
     let rows: Vec<Value> = found.iter().map(|(case, found)| described(case, found.is_assured())).collect();

@@ -14,7 +14,7 @@ use clarabel::solver::{
     SupportedConeT, ZeroConeT,
 };
 use punctual_core::barriers::DistanceDisc;
-use punctual_core::filter::{AssuredFilter, BarrierSettings, FilterBuilder, SafetyFilter, Sampling};
+use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Sampling};
 use punctual_core::plan::Failure;
 use punctual_reference::plants::PointMass;
 
@@ -89,14 +89,15 @@ impl Case {
     /// What the filter says: nothing if it accepts.
     fn refused(&self) -> Option<Failure> {
         let goal = DistanceDisc::new([0.0; 2], RADIUS, RADIUS).expect("valid disc");
-        let filter = SafetyFilter::builder(4, 2)
+        let filter = Filter::builder(4, 2)
             .barrier("goal", PointMass, goal, BarrierSettings::within(self.deadline))
             .and_then(|b| b.bounds(&[-self.bound; 2], &[self.bound; 2]))
             .and_then(|b| b.sampling(Sampling::Measured { first: Some(self.period) }))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
-        let mut filter = AssuredFilter::new(filter, self.period).expect("a filter that can be assured");
-        let assurance = *filter.step(0.0, &self.start, &[0.0; 2], &mut [0.0; 2]).expect("right dimensions");
+        let mut filter = filter.with_plans(self.period).expect("a filter that can be assured");
+        let report = filter.step(0.0, &self.start, &[0.0; 2], &mut [0.0; 2]);
+        let assurance = report.expect("right dimensions").assurance.expect("plans");
         assert_eq!(assurance.is_assured(), assurance.failure.is_none());
         assurance.failure
     }

@@ -79,7 +79,8 @@ fn run(case: &Case, difference: Difference) -> Option<End> {
     for k in 0..(END / STEP).round() as usize {
         let t = k as f64 * STEP;
         let (mut u, wanted) = ([0.0; 2], [-x[3], 0.0]);
-        let assurance = *filter.step(t, &x[..4], &wanted, &mut u).expect("right dimensions");
+        let assurance =
+            filter.step(t, &x[..4], &wanted, &mut u).expect("right dimensions").assurance.expect("plans");
         match (k, assurance.standing) {
             (0, Standing::Refused) => return None,
             (_, Standing::Assured) => {}

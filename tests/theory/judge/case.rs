@@ -1,7 +1,7 @@
 //! One closed loop: plant, sets, bounds, reference input, samples; all that is needed to run it again.
 
 use punctual::reproduce::starts;
-use punctual_core::filter::{AssuredFilter, BarrierSettings, FilterBuilder, SafetyFilter, Sampling};
+use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Sampling};
 
 use super::model::{Input, Plant, Shape, State};
 
@@ -167,9 +167,9 @@ impl Case {
         Self { step, ..self.clone() }
     }
 
-    pub(crate) fn filter(&self) -> SafetyFilter {
+    pub(crate) fn filter(&self) -> Filter {
         let inputs = self.plant.inputs();
-        let mut builder = SafetyFilter::builder(self.plant.states(), inputs);
+        let mut builder = Filter::builder(self.plant.states(), inputs);
         for set in &self.sets {
             let source = self.plant.source(&set.shape);
             builder = builder.source("set", source, set.settings()).expect("valid settings");
@@ -184,8 +184,8 @@ impl Case {
     }
 
     /// The same with a witness.
-    pub(crate) fn assured(&self) -> AssuredFilter {
-        AssuredFilter::new(self.filter(), self.step).expect("a filter that can be assured")
+    pub(crate) fn assured(&self) -> Filter {
+        self.filter().with_plans(self.step).expect("a filter that can be assured")
     }
 
     /// The longest hold of the case.

@@ -134,7 +134,7 @@ pub(crate) fn run_assured(case: &Case) -> AssuredRun {
     let mut drawn = (f64::NEG_INFINITY, [0.0; 2]);
     let (mut t, mut x) = (case.start_time, case.start);
     let mut judge = Judge::new(case);
-    let promised: Vec<bool> = filter.promised(t, &x[..states]).collect();
+    let promised: Vec<bool> = filter.planning().expect("plans").promised(t, &x[..states]).collect();
     let mut run = AssuredRun {
         run: Run { promises: Vec::new(), samples: 0, ended: false },
         refused: None,
@@ -148,7 +148,8 @@ pub(crate) fn run_assured(case: &Case) -> AssuredRun {
         let next = case.next_sample(run.run.samples, t, &mut numbers);
         filter.expect_hold(Some(next - t)).expect("a hold");
         let assurance =
-            *filter.step(t, &x[..states], &wanted[..inputs], &mut u[..inputs]).expect("right dimensions");
+            filter.step(t, &x[..states], &wanted[..inputs], &mut u[..inputs]).expect("right dimensions");
+        let assurance = assurance.assurance.expect("plans");
         run.standing = assurance.standing;
         if run.standing == Standing::Refused {
             run.refused = assurance.failure;

@@ -68,93 +68,93 @@ const CONTRACTION: f64 = 0.1;
 
 /// The requirement on one barrier at one instant ahead.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Requirement {
+pub(crate) struct Requirement {
     /// The number of the barrier.
-    pub(super) barrier: usize,
+    pub(crate) barrier: usize,
     /// The bound on its derivatives at that instant.
-    pub(super) bound: PeriodBound,
+    pub(crate) bound: PeriodBound,
     /// The time in s until that instant, finite, > 0.
-    pub(super) ahead: f64,
+    pub(crate) ahead: f64,
     /// The divisor that makes h⁽ʲ⁾ at the end comparable with a row on h⁽ⁿ⁾, where j is the highest order that the
     /// bound weighs: h⁽ⁿ⁾ held for the duration δ changes h⁽ʲ⁾ by δⁿ⁻ʲ/(n − j)! times itself. For j = n − 1 it is δ.
-    pub(super) divisor: f64,
+    pub(crate) divisor: f64,
 }
 
 impl Requirement {
     /// The requirement `ahead` s on, of a barrier of relative degree `n`.
-    pub(super) fn new(barrier: usize, bound: PeriodBound, ahead: f64, n: usize) -> Self {
+    pub(crate) fn new(barrier: usize, bound: PeriodBound, ahead: f64, n: usize) -> Self {
         let order = bound.weights[..n].iter().rposition(|w| *w != 0.0).unwrap_or(0);
         let divisor = (1..=n - order).fold(1.0, |product, i| product * (ahead / i as f64));
         Self { barrier, bound, ahead, divisor }
     }
 
     /// Whether it is on h alone at an instant, not (S), whose floor contains what h is now.
-    pub(super) fn is_instant(&self) -> bool {
+    pub(crate) fn is_instant(&self) -> bool {
         self.bound.decay == 0.0
     }
 
     /// The derivative of its row where the derivatives at that instant move by `change` and the bound stays.
-    pub(super) fn change(&self, change: &Ahead, n: usize, inputs: usize) -> Weighted {
+    pub(crate) fn change(&self, change: &Ahead, n: usize, inputs: usize) -> Weighted {
         let homogeneous = PeriodBound { floor: 0.0, ..self.bound };
         homogeneous.weighted(&change.value[..n], &change.gradient, inputs, self.divisor)
     }
 }
 
 /// The rows over the period as functions of u, for the search.
-pub(super) struct PeriodProblem<'a> {
-    pub(super) slots: &'a [BarrierSlot],
+pub(crate) struct PeriodProblem<'a> {
+    pub(crate) slots: &'a [BarrierSlot],
     /// Requirements, at most [`MAX_ROWS`]; each has a row.
-    pub(super) requirements: &'a [Requirement],
+    pub(crate) requirements: &'a [Requirement],
     /// Number of those at the end of the period; the others are instants within it.
-    pub(super) listed: usize,
-    pub(super) t: f64,
-    pub(super) bounds: &'a Bounds,
-    pub(super) u_ref: &'a [f64],
+    pub(crate) listed: usize,
+    pub(crate) t: f64,
+    pub(crate) bounds: &'a Bounds,
+    pub(crate) u_ref: &'a [f64],
     /// Enforcement of each requirement.
-    pub(super) enforcement: &'a [Enforcement],
-    pub(super) correction_limit: f64,
-    pub(super) errors: &'a MeasurementErrors,
+    pub(crate) enforcement: &'a [Enforcement],
+    pub(crate) correction_limit: f64,
+    pub(crate) errors: &'a MeasurementErrors,
     /// Whether to look far around for an input where the pointwise rows cannot be met either.
-    pub(super) widens: bool,
+    pub(crate) widens: bool,
     /// Whether a plan stands behind the step, so that rows need not be met.
-    pub(super) is_backed: bool,
+    pub(crate) is_backed: bool,
     /// How the only active row of the sample before bent.
-    pub(super) bend: Option<&'a Bend>,
+    pub(crate) bend: Option<&'a Bend>,
 }
 
 /// Scratch memory of the search; its contents change no bit of the next one.
-pub(super) struct Scratch {
+pub(crate) struct Scratch {
     violations: [f64; MAX_ROWS],
-    pub(super) evaluations: Evaluations,
+    pub(crate) evaluations: Evaluations,
     predicted: Predicted,
     /// How the only active row of the last answer bends, where the search knows it.
-    pub(super) bend: Option<Bend>,
+    pub(crate) bend: Option<Bend>,
 }
 
 impl Scratch {
-    pub(super) fn new(plants: SharedPlants) -> Self {
+    pub(crate) fn new(plants: SharedPlants) -> Self {
         let evaluations = Evaluations { ahead: Ahead::ZERO, plants };
         Self { violations: [0.0; MAX_ROWS], evaluations, predicted: Predicted::NOTHING, bend: None }
     }
 
     /// Forgets the last answer.
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         (self.predicted.rows, self.bend) = (RowSet::EMPTY, None);
     }
 
     /// h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ at the instant of requirement `i` under `u`; the rest means nothing. `None` where the search has not
     /// predicted it last.
-    pub(super) fn predicted(&self, i: usize, u: &[f64]) -> Option<&[f64; MAX_RELATIVE_DEGREE]> {
+    pub(crate) fn predicted(&self, i: usize, u: &[f64]) -> Option<&[f64; MAX_RELATIVE_DEGREE]> {
         let Predicted { rows, input, values } = &self.predicted;
         (rows.contains(i) && *u == input[..u.len()]).then(|| &values[i])
     }
 }
 
 /// Room for the evaluations of the sources.
-pub(super) struct Evaluations {
+pub(crate) struct Evaluations {
     /// The last prediction.
     ahead: Ahead,
-    pub(super) plants: SharedPlants,
+    pub(crate) plants: SharedPlants,
 }
 
 /// What the predictions at one input have been.
@@ -239,7 +239,7 @@ impl PeriodProblem<'_> {
     /// Finds u from the pointwise rows and `last`, the input of the step before. On return `rows` are
     /// the sampled ones, linearised at `u`. `None`, with `rows` and `u` as a pointwise step would leave
     /// them, where a source cannot predict or its prediction is not finite.
-    pub(super) fn solve(
+    pub(crate) fn solve(
         &self,
         rows: &mut [Row],
         last: Option<&[f64]>,

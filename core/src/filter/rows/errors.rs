@@ -16,23 +16,23 @@ use crate::scalar::all_finite;
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
 /// The derivatives of h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ along one error.
-pub(super) type ErrorSlopes = [f64; MAX_RELATIVE_DEGREE];
+pub(crate) type ErrorSlopes = [f64; MAX_RELATIVE_DEGREE];
 
 /// The largest errors as directions of the state.
-pub(super) struct MeasurementErrors {
+pub(crate) struct MeasurementErrors {
     state_dim: usize,
     /// One after the other, ε_i along axis i; only those that are not 0.
     directions: Vec<f64>,
 }
 
 /// The largest error of a row, and its derivative by u.
-pub(super) struct Uncertainty {
-    pub(super) size: f64,
-    pub(super) gradient: [f64; MAX_INPUTS],
+pub(crate) struct Uncertainty {
+    pub(crate) size: f64,
+    pub(crate) gradient: [f64; MAX_INPUTS],
 }
 
 impl MeasurementErrors {
-    pub(super) fn new(errors: &[f64]) -> Self {
+    pub(crate) fn new(errors: &[f64]) -> Self {
         let state_dim = errors.len().max(1);
         let mut directions = Vec::new();
         for (i, error) in errors.iter().enumerate().filter(|(_, error)| **error > 0.0) {
@@ -42,18 +42,18 @@ impl MeasurementErrors {
     }
 
     /// Whether there are none.
-    pub(super) fn is_exact(&self) -> bool {
+    pub(crate) fn is_exact(&self) -> bool {
         self.directions.is_empty()
     }
 
     /// Number of states that have one.
-    pub(super) fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.directions.len() / self.state_dim
     }
 
     /// Bounds on the errors of h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ at `t` and `x`; their parts along each error to `slopes`. Not finite where
     /// the derivatives are not.
-    pub(super) fn of_derivatives(
+    pub(crate) fn of_derivatives(
         &self,
         source: &dyn DerivativeSource,
         t: f64,
@@ -80,7 +80,7 @@ impl MeasurementErrors {
 
     /// The largest error of the row over the period of `bound`, divided by its divisor, from t, x, u and the time
     /// ahead. `None` where that is not finite.
-    pub(super) fn of_row(
+    pub(crate) fn of_row(
         &self,
         source: &dyn DerivativeSource,
         (t, x, u, period): (f64, &[f64], &[f64], f64),
@@ -115,7 +115,7 @@ impl MeasurementErrors {
 /// W. τ s later it is Σ_{j<n} η_j τʲ/j! + W τⁿ/n!, exactly so where h is linear and the plant a chain of integrators
 /// (`docs/theory.md#between-samples`).
 #[derive(Clone, Copy)]
-pub(super) struct Shortfall {
+pub(crate) struct Shortfall {
     coefficients: [f64; MAX_RELATIVE_DEGREE + 1],
     /// The time in s between the sample and the instant from which the input acts.
     delay: f64,
@@ -124,7 +124,7 @@ pub(super) struct Shortfall {
 impl Shortfall {
     /// `None` where nothing is off.
     #[inline]
-    pub(super) fn new(errors: &[f64], disturbance: f64, delay: f64) -> Option<Self> {
+    pub(crate) fn new(errors: &[f64], disturbance: f64, delay: f64) -> Option<Self> {
         if disturbance == 0.0 && errors.iter().all(|error| *error == 0.0) {
             return None;
         }
@@ -138,12 +138,12 @@ impl Shortfall {
     }
 
     /// The part of the disturbance of h⁽ⁿ⁾ in it, `at` s after the input begins to act.
-    pub(super) fn of_disturbance(&self, n: usize, at: f64) -> f64 {
+    pub(crate) fn of_disturbance(&self, n: usize, at: f64) -> f64 {
         (0..n).fold(self.coefficients[n], |product, _| product * (at + self.delay))
     }
 
     /// It, and its slope, `at` s after the input begins to act.
-    pub(super) fn at(&self, at: f64) -> [f64; 2] {
+    pub(crate) fn at(&self, at: f64) -> [f64; 2] {
         let after = at + self.delay;
         self.coefficients
             .iter()
@@ -153,7 +153,7 @@ impl Shortfall {
 }
 
 /// Whether `source` gives derivatives along a direction, a moment ahead too.
-pub(super) fn check(source: &dyn DerivativeSource) -> Result<(), Error> {
+pub(crate) fn check(source: &dyn DerivativeSource) -> Result<(), Error> {
     if source.directional().is_some() && source.predict_directional().is_some() {
         return Ok(());
     }
@@ -162,7 +162,7 @@ pub(super) fn check(source: &dyn DerivativeSource) -> Result<(), Error> {
 }
 
 /// Whether a filter with these barriers can allow for errors, and tells the barriers.
-pub(super) fn check_all(slots: &mut [BarrierSlot], sampling: Sampling, delay: f64) -> Result<(), Error> {
+pub(crate) fn check_all(slots: &mut [BarrierSlot], sampling: Sampling, delay: f64) -> Result<(), Error> {
     let refuse = |message: String| Err(Error::new(ErrorKind::Unsupported, "measurement_errors", message));
     if sampling == Sampling::Pointwise {
         return refuse("needs the prediction over the period, the sampling is pointwise".into());

@@ -3,7 +3,7 @@
 use super::hold::Hold;
 use super::outlook::{self, Outlook};
 use super::search::{PeriodProblem, Requirement};
-use super::{BarrierReport, SAME_PERIOD, SafetyFilter, Sampling, Status, Workspace};
+use super::{BarrierReport, Rows, SAME_PERIOD, Sampling, Status, Workspace};
 use crate::convergence::{FixedTimeState, Unmet};
 use crate::elementary;
 use crate::error::{Error, length};
@@ -21,41 +21,41 @@ const WIDE: (u32, u32) = (8, 16);
 const MUCH_FURTHER: f64 = 4.0;
 
 /// Time and place of a sample, and the hold of its input.
-pub(super) struct Moment<'a> {
+pub(crate) struct Moment<'a> {
     /// Time of the sample in s.
-    pub(super) t: f64,
+    pub(crate) t: f64,
     /// Time in s from the sample until its input acts.
-    pub(super) delay: f64,
+    pub(crate) delay: f64,
     /// Time in s from which its input acts.
-    pub(super) begin: f64,
-    pub(super) x: &'a [f64],
-    pub(super) u_ref: &'a [f64],
+    pub(crate) begin: f64,
+    pub(crate) x: &'a [f64],
+    pub(crate) u_ref: &'a [f64],
     /// The period in s that the rows look over, `None` for the pointwise constraint.
-    pub(super) period: Option<f64>,
+    pub(crate) period: Option<f64>,
     /// The longest time in s that the input is expected to be held.
-    pub(super) hold: f64,
+    pub(crate) hold: f64,
     /// The longest time in s that a hold of `hold` s may turn out to last.
-    pub(super) long: f64,
+    pub(crate) long: f64,
     /// Whether the period is measured.
-    pub(super) measures: bool,
+    pub(crate) measures: bool,
     /// Whether an input has a bound: without any nothing is ruled out.
-    pub(super) bounded: bool,
+    pub(crate) bounded: bool,
 }
 
 impl Moment<'_> {
     /// The hold in s that margins and rates account for, 0 for the pointwise constraint.
-    pub(super) fn covered(&self) -> f64 {
+    pub(crate) fn covered(&self) -> f64 {
         self.period.map_or(0.0, |_| self.hold)
     }
 }
 
-impl SafetyFilter {
+impl Rows {
     /// Takes a sample: writes its input to `u`, its report and the state after it to the workspace.
-    pub(super) fn sample(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<(), Error> {
+    pub(crate) fn sample(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<(), Error> {
         length("x", x.len(), self.state_dim)?;
         length("u_ref", u_ref.len(), self.input_dim)?;
         length("u", u.len(), self.input_dim)?;
-        self.workspace.next.clone_from(&self.state);
+        self.workspace.next.clone_rows_from(&self.state);
         self.workspace.report.reset(t);
         self.note_start(t);
         let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
@@ -355,7 +355,7 @@ impl SafetyFilter {
         // What has begun to count goes on: the deadlines too, where the inputs were valid.
         let start = next.start;
         let starts: [Option<f64>; MAX_ROWS] = core::array::from_fn(|i| next.barriers.get(i)?.start_time);
-        next.clone_from(&self.state);
+        next.clone_rows_from(&self.state);
         next.start = start;
         for (promise, start) in next.barriers.iter_mut().zip(starts) {
             promise.start_time = start;

@@ -41,11 +41,11 @@ impl Plant {
 type Source<'a> = (&'a dyn DerivativeSource, Option<usize>);
 
 /// The plants along which there are several barriers of one relative degree.
-pub(super) struct SharedPlants(Vec<Plant>);
+pub(crate) struct SharedPlants(Vec<Plant>);
 
 impl SharedPlants {
     /// Finds the plants that the sources of `slots` share, and tells each its number.
-    pub(super) fn of(slots: &mut [BarrierSlot]) -> Self {
+    pub(crate) fn of(slots: &mut [BarrierSlot]) -> Self {
         let mut plants = Vec::new();
         for i in 0..slots.len() {
             let (before, rest) = slots.split_at_mut(i);
@@ -70,7 +70,7 @@ impl SharedPlants {
 
     /// Begins another sample.
     #[inline(always)]
-    pub(super) fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         for plant in &mut self.0 {
             (plant.is_moving, plant.duration) = (false, None);
         }
@@ -78,7 +78,7 @@ impl SharedPlants {
 
     /// Writes the derivatives of the barrier of a source at time `t` (s) and the state `x` from which the input of the sample acts.
     #[inline(always)]
-    pub(super) fn evaluate(&mut self, source: Source, t: f64, x: &[f64], out: &mut Derivatives) {
+    pub(crate) fn evaluate(&mut self, source: Source, t: f64, x: &[f64], out: &mut Derivatives) {
         let Some((plant, source)) = self.shared(source) else { return source.0.evaluate(t, x, out) };
         if !plant.is_moving {
             source.motion(x, &mut *plant.motion);
@@ -90,7 +90,7 @@ impl SharedPlants {
     /// Writes what [`Predict::ahead_of_row`](crate::lie::Predict::ahead_of_row) does for the barrier of `slot`. `None` where there
     /// is no prediction.
     #[inline(always)]
-    pub(super) fn ahead_of_row(
+    pub(crate) fn ahead_of_row(
         &mut self,
         slot: &BarrierSlot,
         t: f64,

@@ -1,6 +1,7 @@
 //! The input of a sample: u_ref where a plan stands behind it, else as near to it as one does.
 
-use super::{AMPLE, AssuredFilter, Driver, Piece, Reason, Standing};
+use super::planning::{AMPLE, Planning};
+use super::{Driver, Reason, Standing};
 use crate::MAX_INPUTS;
 use crate::plan::{Failure, Plan, Planner, Sought, Tightest, Witness};
 use crate::scalar::all_finite;
@@ -93,6 +94,12 @@ impl Way {
         (2 * self.pause).clamp(PAUSES[0], PAUSES[1])
     }
 
+    /// Notes that the plan's own input was the part `share` of the last sample's, and is that of this one's.
+    pub(super) fn note(&mut self, share: [f64; 2], driver: Driver) {
+        self.wished = matches!(driver, Driver::Reference | Driver::Eased);
+        self.pass(share.map(|share| share <= GIVEN_BACK));
+    }
+
     /// Notes who had the last sample, and who has this one.
     fn pass(&mut self, [before, now]: [bool; 2]) {
         self.wait = self.wait.saturating_sub(1);
@@ -111,6 +118,25 @@ impl Way {
     }
 }
 
+/// How an input moves with its sample, as long as the piece of the filter is the same: with `rows` times the answer of the rows
+/// and `wish` times u_ref. The rest, that of a plan, is held, and so is each input that is `held`.
+#[derive(Clone, Copy)]
+pub(super) struct Piece {
+    pub(super) rows: f64,
+    pub(super) wish: f64,
+    pub(super) held: [bool; MAX_INPUTS],
+}
+
+impl Piece {
+    pub(super) const WISH: Self = Self::mixed(0.0, 1.0);
+    pub(super) const ROWS: Self = Self::mixed(1.0, 0.0);
+    pub(super) const PLAN: Self = Self::mixed(0.0, 0.0);
+
+    const fn mixed(rows: f64, wish: f64) -> Self {
+        Self { rows, wish, held: [false; MAX_INPUTS] }
+    }
+}
+
 /// An input that was chosen, and what is behind it.
 pub(super) struct Chosen {
     pub(super) driver: Driver,
@@ -123,6 +149,7 @@ pub(super) struct Chosen {
 }
 
 /// What is wished at a sample.
+#[derive(Clone, Copy)]
 pub(super) struct Wish<'a> {
     /// u_ref, and that within its bounds.
     pub(super) wish: &'a [f64],
@@ -133,7 +160,7 @@ pub(super) struct Wish<'a> {
     pub(super) reached: bool,
 }
 
-impl AssuredFilter {
+impl Planning<'_> {
     /// The input from `x` at `t`: u_ref where a comfortable plan stands behind it, be it the one at hand or another; else as far
     /// towards it from the plan's own as one does. Where every set has been reached the answer of the rows comes in between.
     ///
@@ -147,7 +174,7 @@ impl AssuredFilter {
         Wish { wish, wanted, rows, reached }: Wish<'_>,
         way: &mut Way,
     ) -> Result<Chosen, Failure> {
-        let (plan, share) = (&self.next.plan, self.commitment.share);
+        let (plan, share) = (&self.now().plan, self.before().share);
         let (is_wish, passes) = (all_finite(wish), share <= GIVEN_BACK);
         if is_wish && passes {
             way.eagerness = way.eagerness.max(self.bounds.part(wanted));
@@ -156,8 +183,8 @@ impl AssuredFilter {
         // Where every set has been reached, with the margin that the rows aim at and gently, as long as u_ref has its way; where the
         // rows took over they let it pass, or it is far from every edge.
         let margin = |at: &Tightest| {
-            let kept = self.next.promises[at.barrier].map_or(0.0, |promise| promise.margin);
-            self.filter().slots[at.barrier].promise.settings().margin.max((AMPLE - 1.0) * kept)
+            let kept = self.now().promises[at.barrier].map_or(0.0, |promise| promise.margin);
+            self.rows.slots[at.barrier].promise.settings().margin.max((AMPLE - 1.0) * kept)
         };
         let wished = way.wished;
         let comfortable = |witness: &Witness| {
@@ -167,8 +194,8 @@ impl AssuredFilter {
             }
             let least = |at: &Tightest| match (wished, is_gentle) {
                 (true, true) => 0.0,
-                (true, false) => FAR[0] * self.filter().report().barriers[at.barrier].h,
-                (false, _) => FAR[1] * self.filter().report().barriers[at.barrier].h,
+                (true, false) => FAR[0] * self.rows.workspace.report.barriers[at.barrier].h,
+                (false, _) => FAR[1] * self.rows.workspace.report.barriers[at.barrier].h,
             };
             witness.tightest.is_none_or(|at| at.slack >= least(&at).max(margin(&at)))
         };
@@ -269,7 +296,7 @@ impl AssuredFilter {
             Some((share, witness))
         });
         let (share, witness) = found.unwrap_or((1.0, kept));
-        way.held = if share > self.commitment.share { HELD } else { way.held.saturating_sub(1) };
+        way.held = if share > self.before().share { HELD } else { way.held.saturating_sub(1) };
         if first.is_some_and(|first| share > first) {
             (way.returns, way.wait) = (false, way.wait.max(way.pause));
         }
@@ -288,9 +315,9 @@ impl AssuredFilter {
         if way.wait > 0 {
             return None;
         }
-        match planner.renewed(&self.next.plan, t, x, u, &mut way.sought) {
+        match planner.renewed(&self.now().plan, t, x, u, &mut way.sought) {
             Ok(plan) if plan.witness.effort <= comfort => {
-                way.find(self.commitment.share > GIVEN_BACK);
+                way.find(self.before().share > GIVEN_BACK);
                 Some(plan)
             }
             Ok(_) | Err(false) => {
@@ -310,7 +337,7 @@ impl AssuredFilter {
         reached: bool,
     ) -> Chosen {
         let Chosen { driver, mut piece, ref witness, .. } = chosen;
-        let (mut u, last, inputs) = (witness.inputs[0].1, &self.filter().state.input, self.rows.dims()[1]);
+        let (mut u, last, inputs) = (witness.inputs[0].1, &self.rows.state.input, self.rows.input_dim);
         for (i, (u, last)) in u.iter_mut().zip(last).enumerate().take(inputs) {
             let most = SMOOTH * (self.bounds.max[i] - self.bounds.min[i]);
             let smooth = u.max(last - most).min(last + most);
@@ -318,29 +345,23 @@ impl AssuredFilter {
         }
         let is_smooth = !piece.held.contains(&true);
         // u_ref jumps where it wishes to, but not to it from another.
-        let goes_on = driver == Driver::Reference && self.commitment.way.wished;
-        if goes_on || self.commitment.standing != Standing::Assured || is_smooth {
+        let goes_on = driver == Driver::Reference && self.before().way.wished;
+        if goes_on || self.before().standing != Standing::Assured || is_smooth {
             return chosen;
         }
         let smooth = &u[..inputs];
-        let plan = chosen.plan.as_ref().unwrap_or(&self.next.plan);
+        let plan = chosen.plan.as_ref().unwrap_or(&self.now().plan);
         let driver = Driver::Between;
         if let Ok(witness) = planner.behind(plan, t, x, smooth) {
             return Chosen { driver, piece, witness, ..chosen };
         }
         let renewed = || planner.renewed(plan, t, x, smooth, &mut Sought::default()).ok();
         // Where u_ref has just passed, one behind it is sought first.
-        let may_renew = !reached && self.commitment.share > GIVEN_BACK;
+        let may_renew = !reached && self.before().share > GIVEN_BACK;
         match may_renew.then(renewed).flatten() {
             Some(plan) => Chosen { driver, piece, witness: plan.witness.clone(), plan: Some(plan), ..chosen },
             None => chosen,
         }
-    }
-
-    /// Notes in `way` that the plan's own input is the part `share` of this sample's.
-    pub(super) fn note(&self, way: &mut Way, share: f64, driver: Driver) {
-        way.wished = matches!(driver, Driver::Reference | Driver::Eased);
-        way.pass([self.commitment.share, share].map(|share| share <= GIVEN_BACK));
     }
 }
 

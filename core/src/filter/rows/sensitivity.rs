@@ -23,7 +23,7 @@ use alloc::vec::Vec;
 use core::fmt;
 
 use super::search::Requirement;
-use super::{FixedTimeState, Phase, SafetyFilter, Status};
+use super::{FixedTimeState, Phase, Rows, Status};
 use crate::convergence::BoundDerivative;
 use crate::convergence::sampled::{PeriodBound, Weighted};
 use crate::convergence::stay::Means;
@@ -148,58 +148,13 @@ const SAME_INPUT_UNMET: f64 = 1e-6;
 /// A multiplier from this part of its largest on counts as the largest.
 const SATURATED: f64 = 1.0 - 1e-9;
 
-impl SafetyFilter {
-    /// Computes the derivative of what [`Self::peek`] returns where x and u_ref move along `direction`. Remembers
-    /// nothing; the report is that of the sample.
-    ///
-    /// Exact for the piece in force. The input is a piecewise smooth function. Where rows, bounds, a phase or the
-    /// better of two searches change, it has a kink or a jump; the derivative is that of the piece on which the
-    /// sample was computed. A later deadline that was found at this sample ([`Infeasible::Soonest`](super::Infeasible::Soonest))
-    /// is held. Where more rows are active than inputs can follow, the first ones count.
-    ///
-    /// The change of the rate and margin chosen for a set that is kept ([`stay::keep`](crate::convergence::stay::keep)) is a
-    /// quotient of differences, to some 1e-8. So are, to some 1e-4, all but h where the input comes of more than the rows: with [measurement errors](super::FilterBuilder::measurement_errors), where an instant between two samples
-    /// counts, and where the search over the period ended beside the nearest input. Next to a kink they are those of the rows
-    /// linearised at the answer, with errors and instants held.
-    ///
-    /// By status:
-    ///
-    /// - [`Unchanged`](Status::Unchanged), [`SolverFailed`](Status::SolverFailed): the direction of u_ref, 0
-    ///   in components that a bound holds.
-    /// - [`Filtered`](Status::Filtered), [`Infeasible`](Status::Infeasible) and
-    ///   [`NoAuthority`](Status::NoAuthority): (8) with the active rows, those that hold back a row that cannot be
-    ///   met among them; rows given up or left out take no part. A single row that cannot be met: 0 in the
-    ///   components at their bounds, the direction of u_ref in the others.
-    /// - [`InvalidInput`](Status::InvalidInput), [`Singular`](Status::Singular) and
-    ///   [`WrongRelativeDegree`](Status::WrongRelativeDegree), where the input is a constant: all zero.
-    /// - [`NotArmed`](Status::NotArmed): the direction of u_ref, 0 in components that a bound holds; h as ever.
-    ///
-    /// Does not allocate where `out` has been used with this filter before. An answer that is not `None` says why the
-    /// derivative is not known; `out` then means nothing.
+impl Rows {
+    /// As [`Filter::differentiate`](crate::filter::Filter::differentiate), for the answer of the rows.
     ///
     /// # Errors
     ///
     /// A slice of the wrong length; a direction that is not finite.
-    ///
-    /// ```
-    /// # use punctual_core::{barriers::DistanceDisc, filter::*, lie::Direction};
-    /// # use punctual_reference::plants::PointMass;
-    /// let mut filter = SafetyFilter::builder(4, 2)
-    ///     .barrier("goal", PointMass, DistanceDisc::new([45.0, 0.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
-    ///     .build()?;
-    /// let mut derivative = SampleDerivative::default();
-    /// // Wanted sideways: the row, which is on the x axis, lets it pass. Wanted forwards: it makes up for it.
-    /// for (du_ref, wanted) in [([0.0, 1.0], [0.0, 1.0]), ([1.0, 0.0], [0.0, 0.0])] {
-    ///     let direction = Direction { x: &[0.0; 4], u: &du_ref };
-    ///     let unknown =
-    ///         filter.differentiate(0.0, &[0.0; 4], &[0.0; 2], direction, &mut derivative)?;
-    ///     assert_eq!(unknown, None);
-    ///     // Over the period of a tenth of a second the disc is a little round.
-    ///     assert!((0..2).all(|i| (derivative.u[i] - wanted[i]).abs() < 1e-3), "{:?}", derivative.u);
-    /// }
-    /// # Ok::<(), punctual_core::Error>(())
-    /// ```
-    pub fn differentiate(
+    pub(crate) fn differentiate(
         &mut self,
         t: f64,
         x: &[f64],
@@ -217,7 +172,7 @@ impl SafetyFilter {
         }
         let mut u = [0.0; MAX_INPUTS];
         let u = &mut u[..self.input_dim];
-        self.peek(t, x, u_ref, u)?;
+        self.sample(t, x, u_ref, u)?;
         out.u = [0.0; MAX_INPUTS];
         out.barriers.clear();
         out.barriers.resize(self.slots.len(), BarrierDerivative::default());
@@ -232,10 +187,10 @@ impl SafetyFilter {
             vec.reserve(len);
         }
         let constant = [Status::InvalidInput, Status::Singular, Status::WrongRelativeDegree];
-        if constant.contains(&self.report().status) {
+        if constant.contains(&self.workspace.report.status) {
             return Ok(None);
         }
-        if self.report().status == Status::NotArmed {
+        if self.workspace.report.status == Status::NotArmed {
             return Ok(self.directional_unarmed(t, x, u_ref, u, direction, out).err());
         }
         match self.directional(t, x, u_ref, u, direction, out) {
@@ -300,7 +255,7 @@ impl SafetyFilter {
         let by = x.iter().chain(u_ref).zip(along).find(|(_, d)| **d != 0.0);
         let by = PART * by.map_or(1.0, |(v, _)| v.abs().max(1.0));
         let SampleDerivative { u: du, barriers, scratch: [at, ..], moved: [less, more], .. } = out;
-        let status = self.report().status;
+        let status = self.workspace.report.status;
         let mut is_smooth = true;
         for (by, values) in [(-by, &mut *less), (by, &mut *more)] {
             let (mut moved, mut answer) = ([0.0; MAX_INPUTS], [0.0; MAX_INPUTS]);
@@ -310,14 +265,15 @@ impl SafetyFilter {
                 *v = u_ref[i] + by * direction.u[i];
             }
             let answer = &mut answer[..u.len()];
-            let report = self.peek(t, at, &moved[..u.len()], answer)?;
+            self.sample(t, at, &moved[..u.len()], answer)?;
+            let report = &self.workspace.report;
             is_smooth &= report.status == status;
             values.clear();
             values.extend_from_slice(answer);
             values
                 .extend(report.barriers.iter().flat_map(|b| [b.profile, b.margin, b.slack, b.sampling_loss]));
         }
-        self.peek(t, x, u_ref, &mut [0.0; MAX_INPUTS][..u.len()])?;
+        self.sample(t, x, u_ref, &mut [0.0; MAX_INPUTS][..u.len()])?;
         for (u, (less, more)) in u.iter().zip(less.iter().zip(&*more)) {
             let [left, right] = [(u - less) / by, (more - u) / by];
             is_smooth &= (right - left).abs() <= KINK * (1.0 + right.abs().max(left.abs()));
@@ -337,7 +293,7 @@ impl SafetyFilter {
     /// Makes the derivative `out` of the answer of the rows, just computed, that of the input `u` in its place, which moves
     /// by `du`: of the numbers of the report it is the slack that follows.
     #[cfg(feature = "plan")]
-    pub(super) fn carry(
+    pub(crate) fn carry(
         &self,
         t: f64,
         (x, dx): (&[f64], &[f64]),

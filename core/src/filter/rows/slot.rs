@@ -8,8 +8,8 @@ use alloc::vec::Vec;
 use super::errors::{ErrorSlopes, MeasurementErrors, Shortfall};
 use super::hold::Lowest;
 use super::outlook::Outlook;
+use super::sample::Moment;
 use super::shared::SharedPlants;
-use super::step::Moment;
 use super::{FixedTimeState, Infeasible, Phase, SAME_PERIOD, SAME_TIME, Status};
 use crate::convergence::comparison::Stack;
 use crate::convergence::sampled::PeriodBound;
@@ -67,40 +67,40 @@ pub enum Strictness {
 }
 
 /// One barrier of a filter.
-pub(super) struct BarrierSlot {
-    pub(super) name: String,
-    pub(super) source: Box<dyn DerivativeSource>,
+pub(crate) struct BarrierSlot {
+    pub(crate) name: String,
+    pub(crate) source: Box<dyn DerivativeSource>,
     /// The number of its plant, where others share it.
-    pub(super) plant: Option<usize>,
-    pub(super) promise: FixedTime,
-    pub(super) begin: Begin,
-    pub(super) end: End,
-    pub(super) strictness: Strictness,
+    pub(crate) plant: Option<usize>,
+    pub(crate) promise: FixedTime,
+    pub(crate) begin: Begin,
+    pub(crate) end: End,
+    pub(crate) strictness: Strictness,
     /// Whether the state is measured without errors.
-    pub(super) exact: bool,
+    pub(crate) exact: bool,
     /// The result of the present sample.
-    pub(super) now: SlotSample,
+    pub(crate) now: SlotSample,
 }
 
 /// Result of a sample for one barrier: scratch memory that every sample writes anew.
-pub(super) struct SlotSample {
+pub(crate) struct SlotSample {
     /// Whether the barrier is in force; the other fields mean something only where it is.
-    pub(super) in_force: bool,
+    pub(crate) in_force: bool,
     /// The state from which the input acts.
-    pub(super) from: Vec<f64>,
+    pub(crate) from: Vec<f64>,
     /// Derivatives of h there, along the plant.
-    pub(super) derivatives: Derivatives,
+    pub(crate) derivatives: Derivatives,
     /// Derivatives of h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ along each measurement error.
-    pub(super) slopes: Vec<ErrorSlopes>,
+    pub(crate) slopes: Vec<ErrorSlopes>,
     /// What h may fall short of its prediction by, if anything is off.
-    pub(super) shortfall: Option<Shortfall>,
+    pub(crate) shortfall: Option<Shortfall>,
     /// The least h⁽ⁿ⁾ that keeps the promise.
-    pub(super) bound: DerivativeBound,
+    pub(crate) bound: DerivativeBound,
     /// The row on u that follows from it.
-    pub(super) row: Row,
-    pub(super) enforcement: Enforcement,
+    pub(crate) row: Row,
+    pub(crate) enforcement: Enforcement,
     /// The bound on h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ at the end of the period.
-    pub(super) period_bound: PeriodBound,
+    pub(crate) period_bound: PeriodBound,
     /// The instant at which the held input breaks the promise before the next sample, if it does.
     pub(super) lowest: Option<Lowest>,
 }
@@ -129,7 +129,7 @@ impl SlotSample {
 }
 
 impl BarrierSlot {
-    pub(super) fn new(name: &str, source: Box<dyn DerivativeSource>, promise: FixedTime) -> Self {
+    pub(crate) fn new(name: &str, source: Box<dyn DerivativeSource>, promise: FixedTime) -> Self {
         let (begin, end, strictness) = (Begin::default(), End::default(), Strictness::default());
         let now = SlotSample::new(source.state_dim());
         let name = name.to_owned();
@@ -138,14 +138,14 @@ impl BarrierSlot {
 
     /// n.
     #[inline]
-    pub(super) fn degree(&self) -> usize {
+    pub(crate) fn degree(&self) -> usize {
         self.promise.relative_degree()
     }
 
     /// Evaluates h and its derivatives along the plant where the input begins to act
     /// (docs/theory.md, sections 1 and 8). Returns h at the sample itself.
     #[inline]
-    pub(super) fn evaluate(&mut self, moment: &Moment, acting: &[f64], plants: &mut SharedPlants) -> f64 {
+    pub(crate) fn evaluate(&mut self, moment: &Moment, acting: &[f64], plants: &mut SharedPlants) -> f64 {
         let Self { source, plant, now, .. } = self;
         let mut h = None;
         now.from.copy_from_slice(moment.x);
@@ -168,7 +168,7 @@ impl BarrierSlot {
     ///
     /// Derivatives that carry no constraint.
     #[inline]
-    pub(super) fn advance(
+    pub(crate) fn advance(
         &mut self,
         promises: &mut [FixedTimeState],
         index: usize,
@@ -213,7 +213,7 @@ impl BarrierSlot {
     /// Forms the row of that floor, L_fⁿh + L_gL_fⁿ⁻¹h u ≥ floor (docs/theory.md, section 1), and (S) of the period
     /// (`docs/theory.md#sampled-form`). Returns whether there is one of the period.
     #[inline]
-    pub(super) fn form_row(&mut self, promise: &FixedTimeState, moment: &Moment) -> bool {
+    pub(crate) fn form_row(&mut self, promise: &FixedTimeState, moment: &Moment) -> bool {
         let n = self.degree();
         self.now.enforcement = self.enforcement(promise);
         let Derivatives { row: normal, drift, .. } = &self.now.derivatives;
@@ -227,7 +227,7 @@ impl BarrierSlot {
     }
 
     /// (S) over another `duration` in s, `None` where the barrier is not in force or has none.
-    pub(super) fn over(
+    pub(crate) fn over(
         &self,
         promise: &FixedTimeState,
         moment: &Moment,
@@ -272,7 +272,7 @@ impl BarrierSlot {
     }
 
     /// The enforcement of its row.
-    pub(super) fn enforcement(&self, promise: &FixedTimeState) -> Enforcement {
+    pub(crate) fn enforcement(&self, promise: &FixedTimeState) -> Enforcement {
         match self.strictness {
             Strictness::KeepFirst => Enforcement::Hard { priority: u32::from(!promise.was_inside()) },
             Strictness::Priority(priority) => Enforcement::Hard { priority },
@@ -283,7 +283,7 @@ impl BarrierSlot {
     /// Whether the barrier at `index` of `barriers` is in force at time `t` with the value `h`; releases it
     /// where it has ceased to be.
     #[inline]
-    pub(super) fn in_force(&self, barriers: &mut [FixedTimeState], index: usize, t: f64, h: f64) -> bool {
+    pub(crate) fn in_force(&self, barriers: &mut [FixedTimeState], index: usize, t: f64, h: f64) -> bool {
         let begun = !matches!(barriers[index].phase, Phase::Waiting | Phase::Released);
         begun && self.end == End::Never || self.is_due(barriers, index, t, h)
     }
@@ -332,7 +332,7 @@ impl BarrierSlot {
     }
 
     /// Whether model and measurement are exact. Otherwise nothing is ruled out: a disturbance may help.
-    pub(super) fn is_undisturbed(&self) -> bool {
+    pub(crate) fn is_undisturbed(&self) -> bool {
         self.exact && self.promise.settings().disturbance == 0.0
     }
 

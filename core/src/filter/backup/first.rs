@@ -1,0 +1,256 @@
+//! The first sample: the plan that the promises rest on, and the earliest deadlines that a plan keeps.
+
+use alloc::vec::Vec;
+
+use super::planning::Planning;
+use super::state::Promise;
+use crate::MAX_INPUTS;
+use crate::elementary;
+use crate::filter::{Begin, Standing};
+use crate::plan::{Failure, Plan, Planner, Witness};
+
+/// Parts of the deadlines for which a plan is sought where none is found for the deadlines themselves: it keeps them too. Each
+/// makes a refusal longer by as much as the first search.
+pub(super) const SHORTER: [f64; 1] = [0.8];
+/// The most points of a plan's way at which it is looked for its arrival, about.
+const MOST_POINTS: f64 = 4000.0;
+/// How much later than a plan arrives the deadline is that it keeps.
+const ARRIVED: [f64; 2] = [1.001, 1.02];
+
+/// What a first sample is promised with.
+pub(super) struct First {
+    pub(super) promises: Vec<Option<Promise>>,
+    pub(super) plan: Plan,
+    /// Whether the plan is one from before the filter was armed again.
+    pub(super) is_old: bool,
+}
+
+impl Planning<'_> {
+    /// The plan that a first sample at `t` and `x` would find, with every deadline `factor` times as long. Remembers
+    /// nothing. `factor`: finite, > 0.
+    ///
+    /// # Errors
+    ///
+    /// What the nearest trial fails at.
+    pub fn plan_from(&self, t: f64, x: &[f64], factor: f64) -> Result<Witness, Failure> {
+        let x = &self.state(x)[..];
+        let promises = self.promises(t, x, |_| factor);
+        self.first(promises, (t, self.plans.period), x, &[], &SHORTER).map(|first| first.plan.witness)
+    }
+
+    /// What [`Self::plan_from`] says of the deadlines themselves, and [`Self::earliest_deadline`], with one search for both.
+    pub fn appraise(
+        &self,
+        t: f64,
+        x: &[f64],
+        longest: f64,
+    ) -> (Result<Witness, Failure>, Option<(f64, Witness)>) {
+        let state = &self.state(x)[..];
+        let promises = self.promises(t, state, |_| 1.0);
+        match self.first(promises, (t, self.plans.period), state, &[], &SHORTER) {
+            Ok(first) => (Ok(first.plan.witness.clone()), self.least(t, x, longest, Some(first))),
+            Err(failure) => (Err(failure), self.least(t, x, longest, None)),
+        }
+    }
+
+    /// Whether each barrier is one that a first sample at `t` and `x` could promise: not a soft one, one that ends before its
+    /// deadline, or one without a deadline that begins at once and whose set `x` is outside of.
+    pub fn promised(&self, t: f64, x: &[f64]) -> impl Iterator<Item = bool> + use<> {
+        self.promises(t, &self.state(x), |_| 1.0).into_iter().map(|promise| promise.is_some())
+    }
+
+    /// The least factor by which every deadline has to be multiplied for a plan from `x` at `t` to be found, to a
+    /// fiftieth or less where a plan arrives sooner than it has to, and that plan. None is looked for beyond `longest` times the
+    /// deadlines, nor where one would come after the end of its barrier.
+    pub fn earliest_deadline(&self, t: f64, x: &[f64], longest: f64) -> Option<(f64, Witness)> {
+        self.appraise(t, x, longest).1
+    }
+
+    /// The same where [none is found](Self::plan_from) for the deadlines themselves, which is not tried again.
+    pub fn later_deadline(&self, t: f64, x: &[f64], longest: f64) -> Option<(f64, Witness)> {
+        self.least(t, x, longest, None)
+    }
+
+    /// The model's states along `witness` from the measured state `x` at `t`, in steps of at most `step` s, finite, > 0:
+    /// each with the input that is held from there until the next. The last is the rest, with the input that holds it.
+    pub fn trajectory(
+        &self,
+        witness: &Witness,
+        t: f64,
+        x: &[f64],
+        step: f64,
+    ) -> Vec<(f64, Vec<f64>, [f64; MAX_INPUTS])> {
+        self.along(witness, t, &self.state(x), step)
+    }
+
+    /// [`Self::earliest_deadline`], where `first` was found for the deadlines themselves.
+    pub(super) fn least(
+        &self,
+        t: f64,
+        x: &[f64],
+        longest: f64,
+        first: Option<First>,
+    ) -> Option<(f64, Witness)> {
+        let x = &self.state(x)[..];
+        let promised = |factor: f64| self.promises(t, x, |_| factor);
+        let arrived = |factor: f64, First { promises, plan, .. }: First| {
+            (factor * self.arrival(&promises, &plan, t, x), plan)
+        };
+        let find = |factor: f64| {
+            let found = self.first(promised(factor), (t, self.plans.period), x, &[], &[]).ok()?;
+            Some(arrived(factor, found))
+        };
+        let sooner = |factor: f64, (before, plan): &(f64, Plan)| {
+            let found =
+                self.beside(promised(factor), (t, self.plans.period), x, &[], plan, factor / before).ok()?;
+            Some(arrived(factor, found))
+        };
+        let found = first.map(|first| arrived(1.0, first));
+        let (factor, plan) = least_factor(self.longest(longest, |_| true), found, find, sooner)?;
+        Some((factor, plan.witness))
+    }
+
+    /// The first plan for `promises`, with their reserve, else without, else for deadlines that are one of the parts `shorter`
+    /// of theirs, else the one at hand.
+    pub(super) fn first(
+        &self,
+        mut promises: Vec<Option<Promise>>,
+        at: (f64, f64),
+        x: &[f64],
+        u: &[f64],
+        shorter: &[f64],
+    ) -> Result<First, Failure> {
+        if let Some(failure) = self.contradiction(&promises, at.0) {
+            return Err(failure);
+        }
+        let search =
+            |promises: &[Option<Promise>]| self.planned(promises, at, u, |planner| planner.search(at.0, x));
+        let mut found = search(&promises);
+        if found.is_err() && promises.iter().flatten().any(|promise| promise.reserve > promise.margin) {
+            promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);
+            found = search(&promises);
+        }
+        if let Err(Failure::Broken { .. } | Failure::Unsteady) = found
+            && self.plans.horizon.is_none()
+            && !self.is_ruled_out(&promises, at.0, x)
+        {
+            // What keeps an earlier deadline keeps a later one, though another search may find it.
+            let mut earlier =
+                shorter.iter().filter_map(|part| search(&self.sooner(&promises, at.0, *part)).ok());
+            found = earlier.next().map_or(found, Ok);
+        }
+        let Err(failure) = found else { return found.map(|plan| First { promises, plan, is_old: false }) };
+        let old = &self.before().plan;
+        if self.before().standing != Standing::Undecided || old.is_empty() {
+            return Err(failure);
+        }
+        promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);
+        let is_irregular = !self.before().is_regular(at.0, at.1);
+        let tail = |planner: &Planner<'_>| planner.irregular(is_irregular).tail(old, at.0, x);
+        match self.planned(&promises, at, u, tail) {
+            // One that ends sooner reaches nothing.
+            Ok(witness) if promises.iter().flatten().all(|promise| promise.from < witness.until) => {
+                let mut plan = old.clone();
+                plan.witness = witness;
+                Ok(First { promises, plan, is_old: true })
+            }
+            _ => Err(failure),
+        }
+    }
+
+    /// A plan for `promises` beside one for others, whose deadlines are these by `factor`; only near that one it is sought.
+    pub(super) fn beside(
+        &self,
+        mut promises: Vec<Option<Promise>>,
+        at: (f64, f64),
+        x: &[f64],
+        u: &[f64],
+        plan: &Plan,
+        factor: f64,
+    ) -> Result<First, Failure> {
+        if self.is_ruled_out(&promises, at.0, x) {
+            return Err(Failure::Nothing);
+        }
+        promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);
+        let search = |planner: &Planner<'_>| planner.beside(plan, factor).search(at.0, x);
+        let plan = self.planned(&promises, at, u, search)?;
+        Ok(First { promises, plan, is_old: false })
+    }
+
+    /// The part of the time until their deadlines that `plan`, which keeps `promises` from `x` at `t`, needs for them all, at most 1.
+    pub(super) fn arrival(&self, promises: &[Option<Promise>], plan: &Plan, t: f64, x: &[f64]) -> f64 {
+        let end = plan.witness.inputs.last().map_or(t, |(end, _)| *end);
+        let way = self.along(&plan.witness, t, x, self.plans.period.max((end - t) / MOST_POINTS));
+        let mut part = 0.0_f64;
+        for ((promise, slot), model) in promises.iter().zip(&self.rows.slots).zip(self.models()) {
+            let Some(promise) = promise.filter(|p| p.from > t && slot.begin == Begin::AtOnce) else {
+                continue;
+            };
+            let least = promise.margin.max(promise.reserve);
+            let before = way.iter().take_while(|(at, ..)| *at < promise.from);
+            let outside = before.enumerate().filter(|(_, (at, x, _))| {
+                let h = model.value(*at, x);
+                h.is_nan() || h < least
+            });
+            let arrival = outside.last().and_then(|(k, _)| way.get(k + 1)).map_or(t, |(at, ..)| *at);
+            part = part.max((arrival - t) / (promise.from - t));
+        }
+        let keeps = |part: f64| {
+            let sooner = self.sooner(promises, t, part);
+            let keeps = |planner: &Planner<'_>| match planner.keeps(plan, t, x) {
+                true => Ok(()),
+                false => Err(Failure::Nothing),
+            };
+            self.planned(&sooner, (t, self.plans.period), &[], keeps).is_ok()
+        };
+        ARRIVED
+            .into_iter()
+            .map(|late| late * part)
+            .find(|part| *part > 0.0 && *part < 1.0 && keeps(*part))
+            .unwrap_or(1.0)
+    }
+}
+
+/// The least factor for which `find` finds something, to a fiftieth, and that; `None` beyond `longest`. `found` is what it
+/// finds with 1. What is found with a factor, or for a smaller one beside it, is taken to be found with every larger one. `sooner` finds
+/// something beside what was found.
+pub(super) fn least_factor<T>(
+    longest: f64,
+    mut found: Option<(f64, T)>,
+    find: impl Fn(f64) -> Option<(f64, T)>,
+    sooner: impl Fn(f64, &(f64, T)) -> Option<(f64, T)>,
+) -> Option<(f64, T)> {
+    const FINE: f64 = 1.02;
+    const LEAST: f64 = 1e-3;
+    const MOST: f64 = 1e6;
+    const SEARCHES: u32 = 3;
+    const WIDE: f64 = 1.1;
+    // Twice as long until there is one; then by half sooner, and by ever less where none is found beside it.
+    let longest = longest.min(MOST);
+    let (mut low, mut high) = (0.0, 1.0);
+    while found.is_none() && high < longest {
+        (low, high) = (high, (2.0 * high).min(longest));
+        found = find(high);
+    }
+    let (mut found, mut part, mut searches) = (found?, 0.5, SEARCHES);
+    loop {
+        let between = elementary::sqrt(low * found.0);
+        if FINE * part < 1.0 && found.0 > LEAST {
+            let factor = part * found.0;
+            match if factor > low { sooner(factor, &found) } else { None } {
+                Some(nearer) => found = nearer,
+                None => part = elementary::sqrt(part),
+            }
+        } else if searches > 0 && low > 0.0 && WIDE * low < found.0 {
+            // What goes another way may arrive sooner than anything beside what was found.
+            searches -= 1;
+            match find(between) {
+                Some(nearer) => (found, part) = (nearer, 0.5),
+                None => low = between,
+            }
+        } else {
+            break;
+        }
+    }
+    Some(found)
+}

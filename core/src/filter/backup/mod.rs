@@ -1,0 +1,445 @@
+//! Backup plans: what a filter promises is decided at the first sample, and kept within the bounds whatever u_ref is
+//! (`docs/theory.md#witness`).
+//!
+//! | module | owns |
+//! |---|---|
+//! | `state` | the memory: the promises, the plan that keeps them, when the last sample was |
+//! | `status` | what is reported of a step |
+//! | `planning` | the planner of some promises, to ask for plans |
+//! | `first` | the plan of a first sample, and the earliest deadlines that a plan keeps |
+//! | `sample` | a sample: what is promised, whether it is kept, who drives |
+//! | `choice` | the input: the candidates in their order |
+//! | `deviation` | what the plant was seen to do beside the model |
+
+mod choice;
+mod deviation;
+mod first;
+mod planning;
+mod sample;
+mod state;
+mod status;
+
+use alloc::boxed::Box;
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
+
+use super::integrator::Integrator;
+use super::rows::{BarrierSlot, Rows};
+use super::{Begin, End, Filter, FilterState, NoDerivative, SampleDerivative};
+use crate::MAX_INPUTS;
+use crate::error::{Error, ErrorKind, positive};
+use crate::lie::Direction;
+use crate::plan::{Policy, Witness};
+use crate::qp::Bounds;
+use choice::Piece;
+pub use planning::Planning;
+use sample::{At, Decision};
+pub use state::Commitment;
+pub use status::{Assurance, Driver, Reason, Standing};
+
+/// By how much a clock that is measured may be late, as a part of a hold.
+const JITTER: f64 = 0.05;
+/// The shortest hold that plans tell from none, as a part of the period: one that is shorter is planned as that, since a plan may
+/// go on where a sample comes sooner. Of an integral plans count every hold.
+const SHORTEST: f64 = 1e-3;
+const SHORTEST_INTEGRATED: f64 = 0.125;
+
+/// How a filter makes plans ([`Filter::with_plans`]). A number is a period, with plans that end at rest.
+pub struct Plans {
+    /// The time in s for which an input is held, finite, > 0.
+    period: f64,
+    /// Where no plan ends at rest, how far one reaches, in s.
+    horizon: Option<f64>,
+    /// The most quadratic programs of a search at a sample after the first.
+    search_budget: u32,
+    policies: Vec<Policy>,
+    /// Pairs of barriers whose sets have no state in common.
+    apart: Vec<[usize; 2]>,
+}
+
+impl From<f64> for Plans {
+    fn from(period: f64) -> Self {
+        Self::every(period)
+    }
+}
+
+impl Plans {
+    /// The longest deadlines looked for where a barrier takes a later one, in units of those configured.
+    pub const LONGEST: f64 = 16.0;
+    /// The default of [`Self::search_budget`].
+    pub const SEARCH_BUDGET: u32 = 3;
+
+    /// Plans for inputs that are held for `period` s, finite, > 0.
+    pub fn every(period: f64) -> Self {
+        let (policies, apart) = (Vec::new(), Vec::new());
+        Self { period, horizon: None, search_budget: Self::SEARCH_BUDGET, policies, apart }
+    }
+
+    /// Sets the time in s, finite, > 0, that a plan which does not end at rest has to reach past the last deadline and the sample;
+    /// promises are then kept [until its end](Assurance::until). Default `None`: a plan has to end at rest. For plants without a
+    /// rest, such as an aeroplane, and for sets that move for ever. It is tried to be prolonged before it ends.
+    #[must_use]
+    pub fn horizon(self, horizon: impl Into<Option<f64>>) -> Self {
+        Self { horizon: horizon.into(), ..self }
+    }
+
+    /// Adds a policy with which a search for a plan begins: for promises that no search keeps by itself, such as a way
+    /// through a gap. It writes the input at a time in s and a state, both those of the model.
+    #[must_use]
+    pub fn policy(mut self, policy: impl Fn(f64, &[f64], &mut [f64]) + Send + 'static) -> Self {
+        self.policies.push(Box::new(policy));
+        self
+    }
+
+    /// Sets the most quadratic programs, > 0, of a search for a plan at one sample; it goes on at the next. A lost plan and one
+    /// behind u_ref are sought so. The first sample's search goes on to its end, as that of a sample that comes at another time
+    /// than was said, and that of a plan with a [horizon](Self::horizon).
+    #[must_use]
+    pub fn search_budget(self, programs: u32) -> Self {
+        Self { search_budget: programs, ..self }
+    }
+
+    /// Says that the sets of each pair of barriers, by their numbers, have no state in common at any time. What needs both at
+    /// once is then refused without a search ([`Failure::Apart`](crate::plan::Failure::Apart)). Nothing else rests on it.
+    #[must_use]
+    pub fn apart(self, pairs: Vec<[usize; 2]>) -> Self {
+        Self { apart: pairs, ..self }
+    }
+
+    /// # Errors
+    ///
+    /// A period, horizon or budget out of range.
+    fn check(&self) -> Result<(), Error> {
+        positive("period", self.period)?;
+        self.horizon.map(|horizon| positive("horizon", horizon)).transpose()?;
+        match self.search_budget {
+            0 => Err(Error::new(ErrorKind::Range, "search_budget", "is 0, must be at least 1")),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Filter {
+    /// Has the filter promise only what a backup plan keeps. Its inputs are held for the period of `plans`.
+    ///
+    /// At the first sample it searches for a plan from there, in the model and within the bounds. Found: every barrier that
+    /// [can be](Planning::promised) is promised, for whatever u_ref comes. Not found: the promise is refused, and the filter goes on
+    /// by its rows. Once promised, every input has a verified plan behind it. It is u_ref wherever a plan is found behind that; else a
+    /// compromise, once every set has been reached with the answer of the rows; or where nothing else keeps the promise the next input
+    /// of the plan itself.
+    ///
+    /// Assumed: the plant is the model, its state is measured exactly, and samples are one period apart. Where the plant was seen to
+    /// differ, and by half as much again a set might be left before the next sample, the promise is withdrawn for that sample. A sample
+    /// may be taken again at the same time, come sooner, or come late by a twentieth of a hold. Where the time to the next sample changes
+    /// and is [known](Self::expect_hold), a plan is sought for
+    /// the new one; none found ends the promise. A sample that comes later ends it until the next one. Where x is not finite, the
+    /// plan goes on as it is. A barrier without a deadline that [begins later](Begin::At) is promised from then on. A filter
+    /// with bounds on disturbance or measurement errors, a delay, or a deadline for what begins later cannot be assured yet, and
+    /// is refused. Sets must not move, unless [it is known](crate::barrier::Barrier::range_from) how low h
+    /// gets: at a rest each is looked at at eight later times, up to a day, and no plan is found where it has. With a
+    /// [horizon](Plans::horizon) they may, and the plant needs no rest: the promise then has an [end](Assurance::until), which
+    /// is put off. States must be those of the plant, not of something that others move.
+    ///
+    /// Plans account for the mean that a plant with an [integrator](Self::with_integrator) is given over each period, and keep the
+    /// limits of the integral. The search allocates, as do the plans.
+    ///
+    /// ```
+    /// # use punctual_core::{barriers::DistanceDisc, filter::*};
+    /// # use punctual_reference::plants::Unicycle;
+    /// let goal = DistanceDisc::new([20.0, 10.0], 2.0, 1.0)?;
+    /// let mut filter = Filter::builder(4, 2)
+    ///     .barrier("goal", Unicycle, goal, BarrierSettings::within(8.0))?
+    ///     .bounds(&[-5.0, -2.0], &[5.0, 2.0])?
+    ///     .sampling(Sampling::Period(0.02))?
+    ///     .build()?
+    ///     .with_plans(0.02)?;
+    /// let (x, mut u) = ([0.0, 0.0, 1.0, 0.0], [0.0; 2]);
+    /// let report = filter.step(0.0, &x, &[-5.0, 0.0], &mut u)?;
+    /// assert!(report.is_assured() && report.barriers[0].guaranteed);
+    /// # Ok::<(), punctual_core::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    ///
+    /// A number of `plans` out of range. A filter that cannot be assured: a barrier without a model to run ahead, or with
+    /// another plant than the first one; one with a deadline that begins later, one that begins on another's arrival, or
+    /// without a horizon one that moves for ever; a bound on disturbance or measurement errors; a delay. [`Self::obstacles`] lists them
+    /// all.
+    pub fn with_plans(mut self, plans: impl Into<Plans>) -> Result<Self, Error> {
+        let plans = plans.into();
+        plans.check()?;
+        if let Some(obstacle) = self.obstacles(&plans).into_iter().next() {
+            return Err(obstacle);
+        }
+        let mut bounds = self.rows.bounds;
+        if let Some(own) = &self.integrator {
+            [bounds.min[own.of.input], bounds.max[own.of.input]] = own.rates;
+        }
+        self.backup = Some(Box::new(Backup::new(plans, bounds)));
+        Ok(self)
+    }
+
+    /// Everything that keeps the filter from being given `plans`; nothing where [`Self::with_plans`] gives it them.
+    pub fn obstacles(&self, plans: &Plans) -> Vec<Error> {
+        let mut found = Vec::new();
+        let rows = &self.rows;
+        let refused = |field: &str, message: String| Error::new(ErrorKind::Unsupported, field, message);
+        if rows.delay > 0.0 {
+            found.push(refused("actuation_delay", format!("is {}, must be 0 for a plan", rows.delay)));
+        }
+        if !rows.errors.is_exact() {
+            found.push(refused("measurement_errors", "are not 0, must be 0 for a plan".into()));
+        }
+        for slot in &rows.slots {
+            let mut refuse =
+                |field: &str, message: String| found.push(refused(field, message).within(&slot.name));
+            let settings = slot.promise.settings();
+            if settings.disturbance > 0.0 {
+                refuse("disturbance", format!("is {}, must be 0 for a plan", settings.disturbance));
+            }
+            match (slot.begin, settings.deadline) {
+                (Begin::AtOnce, _) | (Begin::At(_), None) => {}
+                (Begin::At(begin), Some(_)) => {
+                    let message = format!("is {begin}, must be 0 for a plan where there is a deadline");
+                    refuse("begin", message);
+                }
+                (Begin::AfterArrival(_), _) => {
+                    refuse("begin", "is the arrival of another barrier, which no plan foresees".into());
+                }
+            }
+            if slot.source.predict().is_none() {
+                refuse("source", "has no model to run ahead".into());
+            } else if plans.horizon.is_none() && slot.end == End::Never && leaves(slot, rows.state_dim) {
+                let message = "moves with time, so that no plan ends; with a horizon one may end before";
+                refuse("source", message.into());
+            }
+        }
+        found.extend(one_plant(rows, plans.period).err());
+        found
+    }
+
+    /// Whether the promises are kept, and who chose the last input; `None` without plans.
+    pub fn assurance(&self) -> Option<&Assurance> {
+        self.backup.as_ref().map(|backup| &backup.assurance)
+    }
+
+    /// The plan that keeps the promises after the last step, where there is one.
+    pub fn plan(&self) -> Option<&Witness> {
+        self.backup.as_ref()?;
+        self.rows.state.plan.witness()
+    }
+
+    /// The planner, to ask for plans; `None` for a filter without them.
+    pub fn planning(&self) -> Option<Planning<'_>> {
+        Some(self.backup.as_ref()?.planning((&self.rows, self.integrator.as_ref())))
+    }
+
+    /// For how long in s the input at `t` is held if samples go on as they came: for as long as the one before, and where the
+    /// clock is not exact for a little longer than ever. A sample in between changes nothing, until eight in a row came as soon.
+    /// At first, and after [`Self::rearm`] at another time than was said, for the period. `None` without plans.
+    pub fn usual_hold(&self, t: f64) -> Option<f64> {
+        Some(self.rows.state.plan.usual_hold(t, self.backup.as_ref()?.period()))
+    }
+
+    /// How long in s the last input was to be held, as far as it is known: without plans the sampling period that was measured.
+    pub fn last_hold(&self) -> Option<f64> {
+        match &self.backup {
+            Some(_) => self.rows.state.plan.last_hold(),
+            None => self.rows.state.period,
+        }
+    }
+}
+
+/// The plans of a filter, and what was said of the last sample.
+pub(super) struct Backup {
+    plans: Plans,
+    /// The bounds of the model's inputs; of an integrated one those of a sample are tighter.
+    bounds: Bounds,
+    /// The sample that the reports are of.
+    looked: Option<Looked>,
+    /// How the input of that sample moves with it.
+    piece: Piece,
+    assurance: Assurance,
+}
+
+/// A sample that was looked at, its input, and that of the model.
+struct Looked {
+    t: f64,
+    hold: f64,
+    x: Vec<f64>,
+    u_ref: Vec<f64>,
+    u: [f64; MAX_INPUTS],
+    inside: [f64; MAX_INPUTS],
+}
+
+impl Backup {
+    fn new(plans: Plans, bounds: Bounds) -> Self {
+        Self { plans, bounds, looked: None, piece: Piece::ROWS, assurance: Assurance::default() }
+    }
+
+    pub(super) fn period(&self) -> f64 {
+        self.plans.period
+    }
+
+    fn planning<'a>(&'a self, (rows, integrator): (&'a Rows, Option<&'a Integrator>)) -> Planning<'a> {
+        Planning { rows, integrator, plans: &self.plans, bounds: &self.bounds }
+    }
+
+    /// Whether a plan stands behind the step at `t`, so that rows need not be met.
+    pub(super) fn is_behind(&self, plan: &Commitment, t: f64, hold: f64, integrates: bool) -> bool {
+        plan.is_followed() && plan.lost.is_none() && plan.in_time(t, self.planned_hold(hold, integrates))
+    }
+
+    /// The hold that plans count with where an input is held for `hold` s.
+    fn planned_hold(&self, hold: f64, integrates: bool) -> f64 {
+        let shortest = if integrates { SHORTEST_INTEGRATED } else { SHORTEST };
+        hold.max(shortest * self.plans.period)
+    }
+
+    /// Goes on from the answer `u` of the rows to that of the whole filter.
+    pub(super) fn sample(
+        &mut self,
+        (rows, integrator): (&mut Rows, Option<&Integrator>),
+        t: f64,
+        hold: f64,
+        x: &[f64],
+        u_ref: &[f64],
+        u: &mut [f64],
+    ) {
+        let hold = self.planned_hold(hold, integrator.is_some());
+        let x = &self.planning((rows, integrator)).state(x)[..];
+        let Self { plans, bounds, assurance, piece, .. } = self;
+        let mut decision = Decision { rows, integrator, plans, bounds, assurance, piece };
+        decision.sample(At { t, hold, x }, u_ref, u);
+        rows.workspace.report.assurance = Some(self.assurance);
+    }
+
+    /// Writes the input of the sample that was looked at last, if it is the one with these arguments. Returns whether it did.
+    pub(super) fn recall(&mut self, t: f64, hold: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> bool {
+        let looked = self.looked.take().filter(|looked| looked.is_at(t, hold, x, u_ref));
+        if let Some(looked) = &looked {
+            u.copy_from_slice(&looked.u[..u.len()]);
+        }
+        self.looked = looked;
+        self.looked.is_some()
+    }
+
+    /// Notes the sample that the reports are of, with the input `u` of the plant and `inside` of the model.
+    pub(super) fn remember(
+        &mut self,
+        (t, hold): (f64, f64),
+        x: &[f64],
+        u_ref: &[f64],
+        u: &[f64],
+        inside: [f64; MAX_INPUTS],
+    ) {
+        let mut looked = Looked { t, hold, x: x.to_vec(), u_ref: u_ref.to_vec(), u: inside, inside };
+        looked.u[..u.len()].copy_from_slice(u);
+        self.looked = Some(looked);
+    }
+
+    /// Forgets the sample that was looked at; returns its input of the model.
+    pub(super) fn forget(&mut self) -> Option<[f64; MAX_INPUTS]> {
+        self.looked.take().map(|looked| looked.inside)
+    }
+
+    /// Goes on from the memory `plan`.
+    pub(super) fn restart(&mut self, plan: &Commitment) {
+        self.looked = None;
+        let (standing, failure) = (plan.standing, plan.failure);
+        let until = plan.witness().map(|witness| witness.until);
+        self.assurance = Assurance { standing, driver: Driver::Rows, failure, until, reason: None };
+    }
+
+    /// Checks a memory that is to be restored.
+    ///
+    /// # Errors
+    ///
+    /// A plan of another filter, or one that is damaged.
+    pub(super) fn check(&self, rows: &Rows, state: &FilterState) -> Result<(), Error> {
+        let is_fresh = state.time.is_none();
+        state.plan.check([rows.state_dim, rows.input_dim], rows.slots.len(), is_fresh, self.plans.horizon)
+    }
+
+    /// Makes the derivative `out` of the answer of the rows that of the input that was given in its place, `inside` the model's.
+    /// Returns why it has none.
+    pub(super) fn carry(
+        &self,
+        (rows, integrator): (&Rows, Option<&Integrator>),
+        (t, hold): (f64, f64),
+        (x, u_ref): (&[f64], &[f64]),
+        inside: &[f64; MAX_INPUTS],
+        direction: Direction,
+        out: &mut SampleDerivative,
+    ) -> Option<NoDerivative> {
+        let Piece { rows: part, wish, held } = self.piece;
+        if part == 1.0 && !held.contains(&true) {
+            return None;
+        }
+        let planning = self.planning((rows, integrator));
+        let wished = planning.moves(hold, u_ref, direction.u);
+        let du = core::array::from_fn(|i| if held[i] { 0.0 } else { part * out.u[i] + wish * wished[i] });
+        let x = &planning.state(x)[..];
+        let dx = &planning.direction(direction.x)[..];
+        rows.carry(t, (x, dx), (&inside[..rows.input_dim], du), out).err()
+    }
+}
+
+impl Looked {
+    /// Whether it is the sample with these arguments, bit for bit.
+    fn is_at(&self, t: f64, hold: f64, x: &[f64], u_ref: &[f64]) -> bool {
+        let same = |a: &[f64], b: &[f64]| a.iter().map(|v| v.to_bits()).eq(b.iter().map(|v| v.to_bits()));
+        same(&[self.t, self.hold], &[t, hold]) && same(&self.x, x) && same(&self.u_ref, u_ref)
+    }
+}
+
+/// A number that no model treats apart, for state `i` of a trial.
+fn trial_state(i: usize, trial: usize) -> f64 {
+    ((i * 37 + trial * 101 + 13) % 89) as f64 / 31.0 - 1.2
+}
+
+/// Whether h changes with time alone, at some states, and it is not known that it does so within limits. It is looked at at some
+/// times in s, and at all at once where it has enclosures.
+fn leaves(slot: &BarrierSlot, states: usize) -> bool {
+    const TIMES: [f64; 4] = [0.0, 0.7, 31.0, 4e3];
+    let Some(model) = slot.source.predict() else { return false };
+    (0..4).any(|trial| {
+        let x: Vec<f64> = (0..states).map(|i| trial_state(i, trial)).collect();
+        let values = TIMES.map(|t| model.value(t, &x));
+        let moves = values.iter().any(|h| (h - values[0]).abs() > 1e-9 * (1.0 + values[0].abs()))
+            || model.is_still(&x) == Some(false);
+        moves && model.lowest_from(0.0, &x).is_none_or(|least| least == f64::NEG_INFINITY)
+    })
+}
+
+/// Checks that every barrier runs the same plant ahead, at some states: a plan is one of all of them.
+fn one_plant(rows: &Rows, period: f64) -> Result<(), Error> {
+    const TRIALS: usize = 4;
+    let (nx, nu) = (rows.state_dim, rows.input_dim);
+    let moved = |slot: &BarrierSlot, trial: usize| {
+        let mut x: Vec<f64> = (0..nx).map(|i| trial_state(i, trial)).collect();
+        let u: Vec<f64> = (0..nu).map(|i| rows.bounds.clamp(i, trial_state(i + nx, trial))).collect();
+        if let Some(plant) = slot.source.predict() {
+            plant.flow(&mut x, &u, period);
+        }
+        x
+    };
+    let mut modelled = rows.slots.iter().filter(|slot| slot.source.predict().is_some());
+    let Some(first) = modelled.next() else { return Ok(()) };
+    for slot in modelled {
+        for trial in 0..TRIALS {
+            let ends = [moved(first, trial), moved(slot, trial)];
+            let same =
+                |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * (1.0 + a.abs()) || a.is_nan() && b.is_nan();
+            if !ends[0].iter().zip(&ends[1]).all(same) {
+                let message = format!(
+                    "moves the state in another way than that of {}; a plan needs one plant for all barriers",
+                    first.name
+                );
+                return Err(Error::new(ErrorKind::Unsupported, "source", message).within(&slot.name));
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,326 @@
+//! What plans are about: the promises of the barriers along the plant, and how plans for them are found. Nothing here is remembered.
+
+use alloc::vec::Vec;
+
+use super::Plans;
+use super::state::{Commitment, Promise};
+use crate::MAX_INPUTS;
+use crate::filter::integrator::{Integrator, insert};
+use crate::filter::rows::{BarrierSlot, Rows};
+use crate::filter::{Begin, End, Integration, Strictness};
+use crate::lie::Predict;
+use crate::plan::{Failure, Integral, Limit, ON_TIME, Planner, Requirement, Witness, slopes};
+use crate::qp::Bounds;
+
+/// Margin of a plan, as a part of the size of h at the first sample: for what the model leaves out between two samples. No
+/// more than a part of the largest h there is: a small set that is far away has no room for it.
+const MARGIN: f64 = 1e-4;
+const ROOM: f64 = 0.05;
+/// Its least size, as that of h where each state is moved so far, and by so much of itself: plans are no better resolved.
+const RESOLVED: [f64; 2] = [1e-7, 64.0 * f64::EPSILON];
+/// Margin of the rows behind which plans are, in units of theirs.
+pub(super) const AMPLE: f64 = 2.0;
+/// The part of the time until the end of a plan after which it is tried again to be prolonged, where it was not.
+const SOONER: f64 = 0.25;
+
+/// The planner of a filter ([`Filter::planning`](crate::filter::Filter::planning)): its barriers along the plant, the integrator, and
+/// how plans are made. It remembers nothing of what it is asked.
+#[derive(Clone, Copy)]
+pub struct Planning<'a> {
+    pub(super) rows: &'a Rows,
+    pub(super) integrator: Option<&'a Integrator>,
+    pub(super) plans: &'a Plans,
+    /// The bounds of the model's inputs; of an integrated one those of the rows are tighter.
+    pub(super) bounds: &'a Bounds,
+}
+
+impl<'a> Planning<'a> {
+    /// The memory before the sample.
+    pub(super) fn before(&self) -> &'a Commitment {
+        &self.rows.state.plan
+    }
+
+    /// The memory after the sample, as far as it is known.
+    pub(super) fn now(&self) -> &'a Commitment {
+        &self.rows.workspace.next.plan
+    }
+
+    /// The model's state where `x` is measured.
+    pub(super) fn state(&self, x: &[f64]) -> Vec<f64> {
+        self.with(x, self.rows.state.integrated)
+    }
+
+    /// The direction of that state where the one measured moves along `dx`.
+    pub(super) fn direction(&self, dx: &[f64]) -> Vec<f64> {
+        self.with(dx, 0.0)
+    }
+
+    /// `x` with `value` in the place of the integral.
+    fn with(&self, x: &[f64], value: f64) -> Vec<f64> {
+        let mut inside = x.to_vec();
+        if let Some(own) = self.integrator {
+            inside.push(0.0);
+            insert(&mut inside, x, own.of.state, value);
+        }
+        inside
+    }
+
+    /// `u_ref` as a wish for the model's input, and within its bounds.
+    pub(super) fn wanted(&self, hold: f64, u_ref: &[f64]) -> ([f64; MAX_INPUTS], [f64; MAX_INPUTS]) {
+        let mut wish = [0.0; MAX_INPUTS];
+        wish[..u_ref.len()].copy_from_slice(u_ref);
+        if let Some(own) = self.integrator {
+            wish[own.of.input] = own.wanted(self.rows.state.integrated, hold, u_ref[own.of.input]);
+        }
+        let within = |i: usize| if i < u_ref.len() { self.rows.bounds.clamp(i, wish[i]) } else { 0.0 };
+        (wish, core::array::from_fn(within))
+    }
+
+    /// The direction of that wish where `u_ref` moves along `du_ref`.
+    pub(super) fn moves(&self, hold: f64, u_ref: &[f64], du_ref: &[f64]) -> [f64; MAX_INPUTS] {
+        let mut moves = [0.0; MAX_INPUTS];
+        moves[..du_ref.len()].copy_from_slice(du_ref);
+        if let Some(own) = self.integrator {
+            moves[own.of.input] *= own.moves(self.rows.state.integrated, hold, u_ref[own.of.input]);
+        }
+        // Beyond its bounds it moves nothing.
+        let (wish, wanted) = self.wanted(hold, u_ref);
+        for (moves, (wish, wanted)) in moves.iter_mut().zip(wish.iter().zip(&wanted)) {
+            *moves = if wish == wanted { *moves } else { 0.0 };
+        }
+        moves
+    }
+
+    /// The integral that the plant is given the mean of, if there is one.
+    fn integral(&self) -> Option<Integral> {
+        self.integrator.map(|own| Integral { state: own.of.state, input: own.of.input })
+    }
+
+    /// Every barrier along the plant, run ahead.
+    pub(super) fn models(&self) -> impl Iterator<Item = &'a dyn Predict> + use<'a> {
+        self.rows.slots.iter().filter_map(|slot| slot.source.predict())
+    }
+
+    /// The promises from `x` at `t`, each deadline multiplied by the factor of its barrier.
+    pub(super) fn promises(
+        &self,
+        t: f64,
+        x: &[f64],
+        factor: impl Fn(&BarrierSlot) -> f64,
+    ) -> Vec<Option<Promise>> {
+        let promise = |(slot, model): (&BarrierSlot, &dyn Predict)| {
+            // Not that of the report, which has none where u_ref is no number.
+            let h = model.value(t, x);
+            // A little earlier, so that round-off of a time is no gap.
+            let after = |seconds: f64| t + seconds - ON_TIME * self.plans.period;
+            let from = match (slot.begin, slot.promise.settings().deadline) {
+                (Begin::At(begin), _) if begin > 0.0 => after(begin),
+                // Not-a-number is asked for at once, and found by the check.
+                _ if h.is_nan() || h >= 0.0 => t,
+                (_, Some(deadline)) => after(factor(slot) * deadline),
+                (_, None) => return None,
+            };
+            let until = match slot.end {
+                End::Never => f64::INFINITY,
+                End::At(seconds) => t + seconds,
+                End::OnArrival => from + self.plans.period,
+            };
+            let soft = matches!(slot.strictness, Strictness::Soft(_));
+            let margin = margin(model, t, x, h);
+            let firm = if from == t && h < AMPLE * margin { after(self.plans.period) } else { t };
+            // Half of the user's, so that a plan stands behind the rows, which aim at all of it.
+            let reserve = slot.promise.settings().margin / AMPLE;
+            // What is kept from now on may be nearer to its edge.
+            let reserve = if from == t { reserve.min(h / AMPLE) } else { reserve };
+            (!soft && until > from).then_some(Promise { from, until, margin, firm, reserve })
+        };
+        self.rows.slots.iter().zip(self.models()).map(promise).collect()
+    }
+
+    /// `promises`, whose deadlines are `part` of the time from `t` that they were; what begins by itself stays.
+    pub(super) fn sooner(&self, promises: &[Option<Promise>], t: f64, part: f64) -> Vec<Option<Promise>> {
+        let sooner = |(promise, slot): (&Option<Promise>, &BarrierSlot)| {
+            let mut promise = (*promise)?;
+            if promise.from > t && slot.begin == Begin::AtOnce {
+                promise.from = t + part * (promise.from - t);
+                if slot.end == End::OnArrival {
+                    promise.until = promise.from + self.plans.period;
+                }
+            }
+            Some(promise)
+        };
+        promises.iter().zip(&self.rows.slots).map(sooner).collect()
+    }
+
+    /// `longest`, or the largest factor with which no deadline of those that `scales` picks comes after the end of its barrier.
+    pub(super) fn longest(&self, longest: f64, scales: impl Fn(&BarrierSlot) -> bool) -> f64 {
+        let ends = self.rows.slots.iter().filter(|slot| scales(slot)).filter_map(|slot| {
+            match (slot.end, slot.promise.settings().deadline) {
+                (End::At(end), Some(deadline)) => Some(end / deadline),
+                _ => None,
+            }
+        });
+        ends.fold(longest, f64::min)
+    }
+
+    /// Two promises that no state keeps at a time at which both are in force.
+    pub(super) fn contradiction(&self, promises: &[Option<Promise>], t: f64) -> Option<Failure> {
+        let slots = &self.rows.slots;
+        self.plans.apart.iter().find_map(|&[a, b]| {
+            let (p, q) = (promises.get(a).copied().flatten()?, promises.get(b).copied().flatten()?);
+            // What is let go on arrival has to be reached at some time until its deadline, and nobody says when.
+            let [of_p, of_q] = [(a, p), (b, q)].map(|(i, promise)| match slots[i].end {
+                End::OnArrival => (t, promise.from + self.plans.period),
+                _ => (promise.from, promise.until),
+            });
+            let is_apart = match [a, b].map(|i| slots[i].end == End::OnArrival) {
+                [true, true] => false,
+                [true, false] => q.from <= t && q.until >= of_p.1,
+                [false, true] => p.from <= t && p.until >= of_q.1,
+                [false, false] => of_p.0.max(of_q.0) < of_p.1.min(of_q.1),
+            };
+            let contains = |i: usize, promise: Promise| {
+                promise.from <= t && slots[i].promise.settings().deadline.is_some()
+            };
+            let [first, second] = if contains(b, q) && !contains(a, p) { [b, a] } else { [a, b] };
+            let contained = contains(first, if first == a { p } else { q });
+            is_apart.then_some(Failure::Apart { barriers: [first, second], contained })
+        })
+    }
+
+    /// Whether it is certain that no input keeps one of the deadlines of `promises` from `x` at `t`.
+    pub(super) fn is_ruled_out(&self, promises: &[Option<Promise>], t: f64, x: &[f64]) -> bool {
+        promises.iter().enumerate().any(|(i, promise)| {
+            let after = promise.filter(|p| p.from > t && p.from.is_finite()).map(|p| p.from - t);
+            after.is_some_and(|after| self.rows.is_ruled_out(i, (t, x), after))
+        })
+    }
+
+    /// Runs `f` with the planner of `promises`, for samples that are `period` s apart.
+    pub(super) fn planned<R>(
+        &self,
+        promises: &[Option<Promise>],
+        (t, period): (f64, f64),
+        u: &[f64],
+        f: impl FnOnce(&Planner<'_>) -> Result<R, Failure>,
+    ) -> Result<R, Failure> {
+        let mut requirements: Vec<Requirement<'_>> = self
+            .models()
+            .zip(promises)
+            .enumerate()
+            .filter_map(|(barrier, (model, promise))| {
+                let Promise { from, until, margin, firm, reserve } = (*promise)?;
+                Some(Requirement { barrier, is_limit: false, model, from, until, margin, firm, reserve })
+            })
+            .collect();
+        if requirements.is_empty() {
+            return Err(Failure::Nothing);
+        }
+        let size = u.iter().fold(1.0, |m: f64, u| m.max(2.0 * u.abs()));
+        let (plant, dims) = (requirements[0].model, [self.rows.state_dim, self.rows.input_dim]);
+        let limits = self.limits(plant);
+        requirements.extend(limits.iter().zip(promises.len()..).map(|(limit, barrier)| {
+            let (from, until) = (t, f64::INFINITY);
+            Requirement {
+                barrier,
+                is_limit: true,
+                model: limit,
+                from,
+                until,
+                // What is kept at a limit is not missed by what no number tells from it.
+                margin: -0.25 * f64::EPSILON * limit.limit.abs(),
+                firm: t,
+                reserve: 0.0,
+            }
+        }));
+        let mut planner =
+            Planner::new(plant, dims, self.bounds, &requirements, period, size).usually(self.plans.period);
+        if let Some(integral) = self.integral() {
+            planner = planner.integrated(integral);
+        }
+        f(&planner.led(&self.plans.policies).until(self.plans.horizon))
+    }
+
+    /// The limits of the integral as barriers along `plant`.
+    pub(super) fn limits<'b>(&self, plant: &'b dyn Predict) -> Vec<Limit<'b>> {
+        let Some(own) = self.integrator else { return Vec::new() };
+        let Integration { state, limits: [min, max], .. } = own.of;
+        let sides = [(1.0, min), (-1.0, max)].into_iter().filter(|(_, limit)| limit.is_finite());
+        sides.map(|(sign, limit)| Limit { plant, state, sign, limit }).collect()
+    }
+
+    /// [`Self::trajectory`] from the model's state `x`.
+    pub(super) fn along(
+        &self,
+        witness: &Witness,
+        t: f64,
+        x: &[f64],
+        step: f64,
+    ) -> Vec<(f64, Vec<f64>, [f64; MAX_INPUTS])> {
+        let (mut at, mut x, mut way) = (t, x.to_vec(), Vec::new());
+        let Some(plant) = self.models().next() else { return way };
+        for (end, u) in &witness.inputs {
+            let (begin, steps) = (at, ((end - at) / step) as usize + 1);
+            for k in 1..=steps {
+                way.push((at, x.clone(), *u));
+                let next = begin + (end - begin) * k as f64 / steps as f64;
+                plant.flow(&mut x, &u[..self.rows.input_dim], next - at);
+                at = next;
+            }
+        }
+        way.extend(witness.inputs.last().map(|(_, u)| (at, x, *u)));
+        way
+    }
+
+    /// The time in s at which a plan that ends at `until` is next tried to be prolonged, at `t`: when it has become as short
+    /// as it may be, and then ever more often until its end.
+    pub(super) fn next_prolonging(&self, t: f64, until: f64) -> f64 {
+        let Some(horizon) = self.plans.horizon else { return f64::INFINITY };
+        let last = self.now().promises.iter().flatten().map(|promise| promise.from).fold(t, f64::max);
+        let is_last = self.now().promises.iter().flatten().all(|promise| promise.until <= until);
+        match until - horizon {
+            _ if is_last => f64::INFINITY,
+            due if last < due => due,
+            _ => t + SOONER * (until - t),
+        }
+    }
+}
+
+/// The margin that plans keep of a barrier that has the value `h` at `t` and `x`.
+fn margin(model: &dyn Predict, t: f64, x: &[f64], h: f64) -> f64 {
+    let mut gradient = x.to_vec();
+    slopes(model, t, x, &mut gradient);
+    let resolved: f64 =
+        x.iter().zip(&gradient).map(|(x, g)| g.abs() * (RESOLVED[0] + RESOLVED[1] * x.abs())).sum();
+    // Not-a-number is no size.
+    let wanted = (MARGIN * h.abs()).max(resolved);
+    let highest = highest(model, t, x, wanted / ROOM);
+    if highest > 0.0 { wanted.min(ROOM * highest) } else { wanted }
+}
+
+/// The largest h found uphill from `x` at `t`, up to `enough`.
+fn highest(model: &dyn Predict, t: f64, x: &[f64], enough: f64) -> f64 {
+    const STEPS: u32 = 60;
+    const HALVINGS: u32 = 30;
+    let (mut x, mut gradient, mut next) = (x.to_vec(), x.to_vec(), x.to_vec());
+    let mut h = model.value(t, &x);
+    for _ in 0..STEPS {
+        slopes(model, t, &x, &mut gradient);
+        let steepness: f64 = gradient.iter().map(|g| g * g).sum();
+        let mut length = (enough - h) / steepness;
+        let climbs = (0..HALVINGS).any(|_| {
+            for (next, (x, g)) in next.iter_mut().zip(x.iter().zip(&gradient)) {
+                *next = x + length * g;
+            }
+            length *= 0.5;
+            model.value(t, &next) > h
+        });
+        // Not-a-number leads nowhere.
+        if h >= enough || !climbs {
+            break;
+        }
+        x.copy_from_slice(&next);
+        h = model.value(t, &x);
+    }
+    h
+}

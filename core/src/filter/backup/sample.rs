@@ -1,0 +1,474 @@
+//! A sample of a filter with plans: what is promised, whether it is kept, and the input that has a plan behind it.
+
+use super::choice::{Chosen, Piece, Way, Wish};
+use super::deviation::Deviation;
+use super::first::{First, SHORTER, least_factor};
+use super::planning::{AMPLE, Planning};
+use super::state::{Commitment, Promise};
+use super::{Assurance, Driver, JITTER, Plans, Standing};
+use crate::MAX_INPUTS;
+use crate::convergence::FixedTimeState;
+use crate::filter::integrator::Integrator;
+use crate::filter::rows::{BarrierSlot, End, Rows, Workspace};
+use crate::filter::{Infeasible, Phase, Status};
+use crate::plan::{Failure, ON_TIME, Plan, Planner, Sought, slopes};
+use crate::qp::Bounds;
+use crate::scalar::all_finite;
+
+/// What a plant may do beside the model in the next hold, in units of what it was seen to do in those before.
+const GUSTS: f64 = 1.5;
+
+/// A sample under way: the rows have answered, and plans decide.
+pub(super) struct Decision<'a> {
+    pub(super) rows: &'a mut Rows,
+    pub(super) integrator: Option<&'a Integrator>,
+    pub(super) plans: &'a Plans,
+    pub(super) bounds: &'a Bounds,
+    pub(super) assurance: &'a mut Assurance,
+    /// How the input of the sample moves with it.
+    pub(super) piece: &'a mut Piece,
+}
+
+/// Time and model state of a sample, and how long its input is held, in s.
+#[derive(Clone, Copy)]
+pub(super) struct At<'a> {
+    pub(super) t: f64,
+    pub(super) hold: f64,
+    pub(super) x: &'a [f64],
+}
+
+impl Decision<'_> {
+    fn planning(&self) -> Planning<'_> {
+        let Self { rows, integrator, plans, bounds, .. } = self;
+        Planning { rows, integrator: *integrator, plans, bounds }
+    }
+
+    fn before(&self) -> &Commitment {
+        &self.rows.state.plan
+    }
+
+    fn now(&self) -> &Commitment {
+        &self.rows.workspace.next.plan
+    }
+
+    fn next(&mut self) -> &mut Commitment {
+        &mut self.rows.workspace.next.plan
+    }
+
+    /// Goes on from the answer `u` of the rows, whose report and state are in the workspace, to that of the whole filter.
+    pub(super) fn sample(&mut self, at: At<'_>, u_ref: &[f64], u: &mut [f64]) {
+        let At { t, hold, x } = at;
+        let Workspace { next, .. } = &mut self.rows.workspace;
+        next.plan.clone_from(&self.rows.state.plan);
+        // Not by the status: u_ref may be no number.
+        if next.plan.standing == Standing::Undecided && !next.is_armed(t, self.rows.arm_after) {
+            (*self.assurance, *self.piece) = (Assurance::default(), Piece::ROWS);
+            return;
+        }
+        let mut rows = [0.0; MAX_INPUTS];
+        rows[..u.len()].copy_from_slice(u);
+        let is_valid = t.is_finite() && all_finite(x);
+        if t.is_finite() && (is_valid || self.now().sample.is_some()) {
+            self.see(t, is_valid.then_some(x));
+            self.next().note(t, hold);
+        }
+        let mut is_regular = self.before().is_regular(t, hold);
+        if self.now().standing == Standing::Undecided && is_valid {
+            // What is made at a sample is made for it.
+            is_regular |= self.decide(at, u);
+        } else if self.before().is_followed() {
+            self.judge(at, is_valid);
+        }
+        (self.assurance.driver, *self.piece, self.assurance.reason) = (Driver::Rows, Piece::ROWS, None);
+        self.release();
+        let is_over = self.now().promises.iter().flatten().all(|promise| promise.until <= t);
+        if self.now().standing == Standing::Assured && !is_over {
+            self.assurance.driver = match is_valid {
+                true => self.choose(at, u_ref, u, is_regular),
+                false => self.go_on(at, u),
+            };
+        } else if self.now().standing == Standing::Undecided && !self.now().plan.is_empty() {
+            if self.before().in_time(t, hold) {
+                self.assurance.driver = self.go_on(at, u);
+            } else {
+                self.next().plan = Plan::default();
+            }
+        }
+        if self.now().standing == Standing::Assured
+            && is_valid
+            && let Some(failure) = self.exposed(at, u)
+        {
+            self.end(Standing::Withdrawn, Some(failure));
+        }
+        let Commitment { standing, failure, plan, .. } = &self.rows.workspace.next.plan;
+        let is_assured = *standing == Standing::Assured;
+        (self.assurance.standing, self.assurance.failure) = (*standing, *failure);
+        self.assurance.until = is_assured.then_some(if is_over { f64::INFINITY } else { plan.witness.until });
+        self.assurance.reason = self.assurance.reason.filter(|_| is_assured);
+        if is_assured || u != &rows[..u.len()] {
+            self.report_on(&rows[..u.len()], u);
+        }
+    }
+
+    /// Decides at the first sample: what is promised, and whether a plan keeps it. Where none does, those barriers that are
+    /// [to take a later deadline](Infeasible::Soonest) get the soonest for which there is one. Whether the plan was made here.
+    fn decide(&mut self, At { t, hold, x }: At<'_>, u: &[f64]) -> bool {
+        let planning = self.planning();
+        let search = |promises, shorter: &[f64]| planning.first(promises, (t, hold), x, u, shorter);
+        let promises = planning.promises(t, x, |_| 1.0);
+        let mut found = search(promises.clone(), &SHORTER).map(|first| (1.0, first));
+        let yields = |slot: &BarrierSlot| slot.promise.settings().infeasible == Infeasible::Soonest;
+        if found.is_err() && planning.rows.slots.iter().any(yields) {
+            let promised =
+                |factor: f64| planning.promises(t, x, |slot| if yields(slot) { factor } else { 1.0 });
+            let later = |factor: f64| search(promised(factor), &[]).ok().map(|first| (factor, first));
+            let sooner = |factor: f64, (before, first): &(f64, First)| {
+                let (promises, plan) = (promised(factor), &first.plan);
+                planning
+                    .beside(promises, (t, hold), x, u, plan, factor / before)
+                    .ok()
+                    .map(|first| (factor, first))
+            };
+            let later = least_factor(planning.longest(Plans::LONGEST, yields), None, later, sooner);
+            found = later.map_or(found, Ok);
+        }
+        match found {
+            Ok((factor, First { promises, plan, is_old })) => {
+                let next = self.next();
+                (next.promises, next.plan) = (promises, plan);
+                next.deviation = Deviation::from(t, x);
+                next.way = Way::beside(&next.plan.witness);
+                self.prolong_next(t);
+                self.end(Standing::Assured, None);
+                self.postpone(t, hold, factor);
+                !is_old
+            }
+            Err(failure) => {
+                let next = self.next();
+                (next.promises, next.plan) = (promises, Plan::default());
+                self.end(Standing::Refused, Some(failure));
+                true
+            }
+        }
+    }
+
+    /// Starts the rows again at the first sample, with deadlines `factor` times as long where they yield. They keep more margin
+    /// than plans do, so that one stands behind their answer at the edge of a set too.
+    fn postpone(&mut self, t: f64, hold: f64, factor: f64) {
+        let Rows { slots, state, workspace, .. } = &mut *self.rows;
+        let Workspace { next, report, .. } = workspace;
+        let states = next.barriers.iter_mut().zip(&state.barriers).zip(&next.plan.promises);
+        for ((slot, ((state, before), promise)), b) in slots.iter().zip(states).zip(&mut report.barriers) {
+            let settings = slot.promise.settings();
+            let later = factor > 1.0 && settings.infeasible == Infeasible::Soonest && b.h < 0.0;
+            state.least_margin = promise.map_or(0.0, |promise| AMPLE * promise.margin);
+            if !slot.now.in_force || !(later || state.least_margin > settings.margin) {
+                continue;
+            }
+            let FixedTimeState { deadline, arrival, on_course, gain, unmet, .. } = *state;
+            let deadline = if later { factor * slot.promise.deadline() } else { deadline };
+            slot.promise.anchor(state, t, &slot.now.derivatives.drift[..slot.degree()], deadline, hold);
+            (state.arrival, state.gain, state.unmet) = (arrival, gain, unmet);
+            if later {
+                // Once, whatever the rows had made of it.
+                state.postponed = before.postponed + 1;
+                (b.time_left, b.deadline_unreachable) = (state.deadline, false);
+            } else {
+                state.on_course = on_course;
+            }
+            b.remember(state);
+        }
+    }
+
+    /// Sees at `t` how far the plant is from where the model has led since the last sample; `x` where it is measured.
+    fn see(&mut self, t: f64, x: Option<&[f64]>) {
+        let before = self.before();
+        let Some([last, _]) = before.sample.filter(|[last, _]| t > *last && before.is_followed()) else {
+            return;
+        };
+        let (u, mut led) =
+            (&self.rows.state.input[..self.rows.input_dim], self.now().deviation.state.clone());
+        let is_led = self.planning().planned(&self.now().promises, (last, t - last), u, |planner| {
+            planner.run(&mut led, u);
+            Ok(())
+        });
+        // Of nothing that is promised nothing may be missed.
+        if is_led.is_ok() {
+            let period = self.plans.period;
+            self.next().deviation.see(t, x, led, period);
+        }
+    }
+
+    /// Judges a promise that was followed: whether the sample came in time, and whether something was missed before it.
+    fn judge(&mut self, At { t, hold, x }: At<'_>, is_valid: bool) {
+        // What came to its end was kept until then.
+        let has_expired = self.before().standing == Standing::Expired;
+        let lost = |standing| if has_expired { Standing::Expired } else { standing };
+        match (self.before().in_time(t, hold), is_valid.then(|| self.missed(t, x)).flatten()) {
+            (true, None) if is_valid => self.end(Standing::Assured, None),
+            (true, None) => {}
+            (false, None) => self.end(lost(Standing::Irregular), None),
+            // For good.
+            (_, failure) => {
+                self.end(lost(Standing::Withdrawn), failure);
+                self.next().promises.fill(None);
+            }
+        }
+    }
+
+    /// What was or may have been missed until `t` since the last plan was followed, where the state is `x`: a set that is
+    /// left, or a promise that began meanwhile.
+    fn missed(&self, t: f64, x: &[f64]) -> Option<Failure> {
+        let Commitment { standing, sample, lost, .. } = self.before();
+        let seen = sample.map_or(t, |[last, held]| match standing {
+            Standing::Assured => last + held * (1.0 + JITTER),
+            // There was a plan, but for a plant that differs.
+            Standing::Withdrawn if lost.is_none() => last + held * (1.0 + JITTER),
+            _ => last,
+        });
+        // A promise is about all times: what is measured again is not what was promised.
+        if t <= seen + 2.0 * f64::EPSILON * t.abs() {
+            return None;
+        }
+        let promises = self.now().promises.iter().zip(self.planning().models());
+        promises.enumerate().find_map(|(barrier, (promise, model))| {
+            let Promise { from, until, .. } = (*promise)?;
+            let h = model.value(t, x);
+            // One that begins with this sample is seen at it.
+            let begins = t - 2.0 * ON_TIME * self.plans.period;
+            match from <= t && t < until {
+                // NaN counts as outside.
+                true if h.is_nan() || h < 0.0 => Some(Failure::Broken { barrier, time: t, slack: h }),
+                true if seen < from && from < begins => Some(Failure::Missed { barrier }),
+                _ => None,
+            }
+        })
+    }
+
+    /// Ends the promise of each set that was let go on arrival.
+    fn release(&mut self) {
+        let Rows { slots, workspace: Workspace { next, report, .. }, .. } = &mut *self.rows;
+        for ((promise, slot), b) in next.plan.promises.iter_mut().zip(slots).zip(&report.barriers) {
+            if slot.end == End::OnArrival && b.phase == Phase::Released {
+                *promise = None;
+            }
+        }
+    }
+
+    /// What may be missed until the next sample under `u`, where the plant goes on to differ from the model as it was
+    /// seen to.
+    fn exposed(&self, At { t, hold, x }: At<'_>, u: &[f64]) -> Option<Failure> {
+        let mut promises = self.now().promises.clone();
+        let differs = self.now().deviation.after(hold, x)?;
+        let mut slope = x.to_vec();
+        for (promise, model) in promises.iter_mut().zip(self.planning().models()) {
+            let Some(kept) = promise.as_mut().filter(|promise| promise.from < t + hold) else {
+                *promise = None;
+                continue;
+            };
+            slopes(model, t, x, &mut slope);
+            let falls: f64 = slope.iter().zip(&differs).map(|(slope, differs)| slope.abs() * differs).sum();
+            (kept.margin, kept.reserve, kept.firm) = (GUSTS * falls, 0.0, t);
+        }
+        match self.planning().planned(&promises, (t, hold), u, |planner| planner.holds(t, x, u)) {
+            Err(Failure::Broken { barrier, time, slack }) => Some(Failure::Drift { barrier, time, slack }),
+            _ => None,
+        }
+    }
+
+    fn end(&mut self, standing: Standing, failure: Option<Failure>) {
+        let next = self.next();
+        (next.standing, next.failure) = (standing, failure);
+    }
+
+    /// Sets when the plan at hand is next tried to be prolonged.
+    fn prolong_next(&mut self, t: f64) {
+        let at = self.planning().next_prolonging(t, self.now().plan.witness.until);
+        self.next().prolong_at = at;
+    }
+
+    /// Looks for a plan that ends later than the one at hand, where it is time to.
+    fn prolong(&mut self, At { t, hold, x }: At<'_>, u: &[f64]) {
+        let Commitment { promises, plan, prolong_at, .. } = self.now();
+        if t < *prolong_at {
+            return;
+        }
+        let longer = self
+            .planning()
+            .planned(promises, (t, hold), u, |planner| planner.beyond(&plan.witness).search(t, x))
+            .ok()
+            .filter(|longer| longer.witness.until > plan.witness.until);
+        if let Some(longer) = longer {
+            self.next().plan = longer;
+        }
+        self.prolong_next(t);
+    }
+
+    /// Chooses the input, `u` of the rows at first, and remembers what is behind it. `is_regular` tells whether the plan is one for
+    /// this sample.
+    fn choose(&mut self, at: At<'_>, u_ref: &[f64], u: &mut [f64], is_regular: bool) -> Driver {
+        self.prolong(at, u);
+        let At { t, hold, x } = at;
+        let (planning, mut way) = (self.planning(), self.now().way.clone());
+        let (wish, wanted) = planning.wanted(hold, u_ref);
+        let wish = Wish {
+            wish: &wish[..u.len()],
+            wanted: &wanted[..u.len()],
+            rows: u,
+            reached: self.now().promises.iter().flatten().all(|promise| promise.from <= t),
+        };
+        let found = planning.planned(&self.now().promises, (t, hold), u, |planner| {
+            let planner = planner.irregular(!is_regular).hurried(planning.plans.search_budget);
+            let chosen = planning.chosen(&planner, (t, x), wish, &mut way)?;
+            Ok(planning.smoothed(&planner, (t, x), chosen, wish.reached))
+        });
+        match found {
+            Ok(chosen) => {
+                let Chosen { driver, piece, share, witness, plan } = chosen;
+                way.note([self.before().share, share], driver);
+                u.copy_from_slice(&witness.inputs[0].1[..u.len()]);
+                self.assurance.reason = way.reason.filter(|_| *u != wanted[..u.len()]);
+                *self.piece = piece;
+                let next = self.next();
+                (next.way, next.share) = (way, share);
+                (next.lost, next.regained) = (None, Sought::default());
+                if let Some(plan) = plan {
+                    next.plan = plan;
+                }
+                next.plan.witness = witness;
+                driver
+            }
+            Err(failure) => self.regain(at, failure, u, is_regular),
+        }
+    }
+
+    /// Looks for another plan where the one at hand keeps the promises no more, for the reason `failure`.
+    fn regain(&mut self, at: At<'_>, failure: Failure, u: &mut [f64], is_regular: bool) -> Driver {
+        let At { t, hold, x } = at;
+        // A plan that ends at rest is sought by a few steps a sample, where samples come as they are to.
+        let is_spread = is_regular && !self.now().plan.is_finite();
+        let (mut regained, mut goes_on) = (self.now().regained.clone(), false);
+        let (planning, plan) = (self.planning(), &self.now().plan);
+        let found = match self.before().lost {
+            Some([_, next]) if t < next => Err(failure),
+            _ => {
+                // One that is lost is found again without its reserve.
+                let mut promises = self.now().promises.clone();
+                promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);
+                planning.planned(&promises, (t, hold), u, |planner| match is_spread {
+                    true => planner
+                        .hurried(planning.plans.search_budget)
+                        .regained(plan, t, x, &mut regained)
+                        .map_err(|left| {
+                            goes_on = left;
+                            failure
+                        }),
+                    false => planner.beyond(&plan.witness).search(t, x),
+                })
+            }
+        };
+        let next = self.next();
+        next.regained = regained;
+        match found {
+            Ok(plan) => {
+                u.copy_from_slice(&plan.witness.inputs[0].1[..u.len()]);
+                (next.plan, next.share) = (plan, 1.0);
+                (next.lost, next.regained) = (None, Sought::default());
+                self.prolong_next(t);
+                *self.piece = Piece::PLAN;
+                Driver::Plan
+            }
+            Err(longer) => {
+                // A plan that has come to its end was kept.
+                let is_at_its_end = next.plan.witness.until <= t + 0.5 * hold;
+                let Commitment { standing, lost, .. } = *self.before();
+                let (standing, failure) = match is_regular {
+                    _ if lost.is_some() => (standing, failure),
+                    _ if is_at_its_end => (Standing::Expired, longer),
+                    true => (Standing::Withdrawn, failure),
+                    false => (Standing::Irregular, failure),
+                };
+                self.end(standing, Some(failure));
+                // Ever more seldom, since a search is long.
+                if lost.is_none_or(|[_, next]| t >= next) {
+                    let since = lost.map_or(t, |[since, _]| since);
+                    let pause = if goes_on { 0.0 } else { (t - since).max(hold).max(self.plans.period) };
+                    self.next().lost = Some([since, t + pause]);
+                }
+                self.come_near(at, u)
+            }
+        }
+    }
+
+    /// Where the promise is lost: the input of the plan's law, where that nearly keeps it from here; else the answer of the
+    /// rows.
+    fn come_near(&mut self, At { t, hold, x }: At<'_>, u: &mut [f64]) -> Driver {
+        let nearly = |planner: &Planner<'_>| planner.nearly(&self.now().plan, t, x);
+        match self.planning().planned(&self.now().promises, (t, hold), u, nearly) {
+            Ok(input) => {
+                u.copy_from_slice(&input[..u.len()]);
+                *self.piece = Piece::PLAN;
+                Driver::Plan
+            }
+            Err(_) => Driver::Rows,
+        }
+    }
+
+    /// Goes on with the plan as it is, where nobody knows where the plant is.
+    fn go_on(&mut self, At { t, hold, .. }: At<'_>, u: &mut [f64]) -> Driver {
+        let plan = &self.now().plan;
+        let inputs = &plan.witness.inputs;
+        let next = inputs.iter().find(|(end, _)| *end > t + 0.5 * hold);
+        // Past its end, a rest that only feedback holds is left.
+        let is_over = next.is_none() && !plan.stays();
+        if let Some((_, input)) = next.or(inputs.last()) {
+            for (i, u) in u.iter_mut().enumerate() {
+                *u = self.bounds.clamp(i, input[i]);
+            }
+        }
+        let is_lost = is_over || !self.before().is_regular(t, hold);
+        if is_lost && self.now().standing == Standing::Undecided {
+            self.next().plan = Plan::default();
+        } else if is_lost {
+            self.end(if is_over { Standing::Withdrawn } else { Standing::Irregular }, None);
+        }
+        Driver::Plan
+    }
+
+    /// Rewrites report and state of the rows, which answered `rows`, for the input `u` actually applied. It has a plan behind it
+    /// where the promise is assured.
+    fn report_on(&mut self, rows: &[f64], u: &[f64]) {
+        let (driver, is_assured) = (self.assurance.driver, self.assurance.is_assured());
+        let Workspace { next, report, .. } = &mut self.rows.workspace;
+        next.input[..u.len()].copy_from_slice(u);
+        report.status = match (report.status, driver) {
+            (Status::InvalidInput, _) => Status::InvalidInput,
+            (status, _) if !is_assured => {
+                if status.is_satisfied() {
+                    Status::Infeasible
+                } else {
+                    status
+                }
+            }
+            (_, Driver::Reference) => Status::Unchanged,
+            (_, Driver::Eased) => Status::Filtered,
+            (status, Driver::Rows) if status.is_satisfied() => status,
+            _ => Status::Backup,
+        };
+        for ((b, state), promise) in
+            report.barriers.iter_mut().zip(&mut next.barriers).zip(&next.plan.promises)
+        {
+            if u != rows {
+                (b.on_course, state.on_course) = (false, false);
+                b.slack = b.row.slack(u);
+            }
+            // Plans count from the first state, rows from the first sample that is whole: a promise may end before its row.
+            let stands = promise.as_ref().is_some_and(|promise| report.time < promise.until);
+            if is_assured && stands && b.phase != Phase::Released {
+                b.guaranteed = true;
+                (b.unmet_steps, state.unmet) = (0, None);
+                (b.blocked_by, b.deadlocked) = (None, false);
+            }
+        }
+    }
+}

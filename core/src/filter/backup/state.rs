@@ -1,0 +1,231 @@
+//! The memory of plans between samples: what is promised, and the plan that keeps it.
+
+use alloc::vec::Vec;
+
+use super::choice::Way;
+use super::deviation::Deviation;
+use super::{JITTER, Standing};
+use crate::error::{Error, ErrorKind, length};
+use crate::plan::{Failure, ON_TIME, Plan, Sought, Witness};
+
+/// The largest round-off of a time, as a part of the period.
+const ROUND_OFF: f64 = 1e-2;
+/// What is kept in hand for the next time where a clock was not exact, as a part of a hold; and how many intervals in a row that are
+/// so much shorter, alike to [`JITTER`], are the new usual ones.
+const HEADROOM: f64 = 0.02;
+const QUICKER: f64 = 0.9;
+const ALIKE: u32 = 8;
+
+/// The part of a [`FilterState`](crate::filter::FilterState) that is of plans: the promises and the plan that keeps them.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Commitment {
+    /// Where the promise stands.
+    pub standing: Standing,
+    /// Why there is no plan, where the promise was refused or withdrawn.
+    pub(super) failure: Option<Failure>,
+    /// One of each barrier; `None` where nothing is promised, or no more.
+    pub(super) promises: Vec<Option<Promise>>,
+    /// The plan; while nothing is decided, one from before [`Filter::rearm`](crate::filter::Filter::rearm).
+    pub(super) plan: Plan,
+    /// Where the plan was lost: when, in s, and when another one is next searched for.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    pub(super) lost: Option<[f64; 2]>,
+    /// The search for another one.
+    pub(super) regained: Sought,
+    /// The part of the last input that was the plan's, beside the answer of the rows; 0 where no plan was needed.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    pub(super) share: f64,
+    /// What is comfortable, and when a plan is next sought behind u_ref.
+    pub(super) way: Way,
+    /// The time in s at which a plan that ends is next tried to be prolonged.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    pub(super) prolong_at: f64,
+    /// Time of the last sample in s, and how long its input was to be held.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    pub(super) sample: Option<[f64; 2]>,
+    /// The time in s between the last two samples, and how many intervals in a row have been like it; 0 before there is one.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    pub(super) interval: f64,
+    pub(super) alike: u32,
+    /// What the plant was seen to do beside the model since the promise was given.
+    pub(super) deviation: Deviation,
+}
+
+impl Commitment {
+    /// Whether the promise stands, or may be taken up again.
+    pub(super) fn is_followed(&self) -> bool {
+        match self.standing {
+            Standing::Assured => true,
+            Standing::Undecided | Standing::Refused => false,
+            Standing::Withdrawn | Standing::Irregular | Standing::Expired => {
+                self.promises.iter().any(Option::is_some)
+            }
+        }
+    }
+
+    /// Notes a sample at `t`, whose input is to be held for `hold` s.
+    pub(super) fn note(&mut self, t: f64, hold: f64) {
+        if let Some([last, _]) = self.sample
+            && t > last
+        {
+            let interval = t - last;
+            self.alike = if is_like(interval, self.interval) { self.alike.saturating_add(1) } else { 1 };
+            self.interval = interval;
+        }
+        self.sample = Some([t, hold]);
+    }
+
+    /// Forgets what was promised. A plan that was followed for it is kept to go on with, and when the last sample was.
+    pub(crate) fn rearm(&mut self) {
+        let Self { standing, promises, plan, sample, interval, alike, .. } = core::mem::take(self);
+        let is_over = |[t, _]: [f64; 2]| promises.iter().flatten().all(|promise| promise.until <= t);
+        let is_followed = match standing {
+            Standing::Assured => !sample.is_none_or(is_over),
+            _ => standing == Standing::Undecided,
+        };
+        if is_followed {
+            (self.plan, self.sample) = (plan, sample);
+            (self.interval, self.alike) = (interval, alike);
+        }
+    }
+
+    /// The plan that keeps the promises, where there is one.
+    pub(super) fn witness(&self) -> Option<&Witness> {
+        (self.standing == Standing::Assured).then_some(&self.plan.witness)
+    }
+
+    /// How long in s the input of the last sample was to be held, if there was one.
+    pub(super) fn last_hold(&self) -> Option<f64> {
+        self.sample.map(|[_, hold]| hold)
+    }
+
+    /// As [`Filter::usual_hold`](crate::filter::Filter::usual_hold), for plans of this `period`.
+    pub(super) fn usual_hold(&self, t: f64, period: f64) -> f64 {
+        let Commitment { standing, sample, alike, interval, .. } = *self;
+        let Some([last, held]) = sample else { return period };
+        let passed = t - last;
+        let is_same = (passed - held).abs() <= ON_TIME * held + 2.0 * f64::EPSILON * t.abs();
+        let is_usual = passed < QUICKER * held && alike + 1 >= ALIKE && is_like(passed, interval);
+        match standing {
+            _ if is_same => held,
+            Standing::Undecided => period,
+            _ if is_like(passed, held) => held.max((1.0 + HEADROOM) * passed),
+            _ if passed > held && passed.is_finite() || passed > 0.0 && is_usual => passed,
+            _ => held,
+        }
+    }
+
+    /// Whether a sample at `t` comes no later than the one before said, but for a clock that is measured, and times tell samples
+    /// apart.
+    pub(super) fn in_time(&self, t: f64, hold: f64) -> bool {
+        let Some([last, held]) = self.sample else { return false };
+        let round_off = 2.0 * f64::EPSILON * t.abs();
+        let late = JITTER * held + round_off;
+        // Not-a-number is out of time.
+        last <= t && t <= last + held + late && round_off <= ROUND_OFF * hold.min(held)
+    }
+
+    /// Whether the sample at `t` is one for which the plan was made.
+    pub(super) fn is_regular(&self, t: f64, hold: f64) -> bool {
+        let Commitment { plan, sample, .. } = self;
+        sample.is_some_and(|[last, held]| {
+            let tolerance = ON_TIME * held + 2.0 * f64::EPSILON * t.abs();
+            plan.witness.is_even
+                && (t == last || t >= last + held - tolerance)
+                && (hold - held).abs() <= ON_TIME * held
+        })
+    }
+
+    /// Checks a memory that is to be restored into a filter with `dims` states and inputs of the model and so many `barriers`, before
+    /// its first sample if it `is_fresh`.
+    ///
+    /// # Errors
+    ///
+    /// A plan of another filter, or one that is damaged.
+    pub(super) fn check(
+        &self,
+        dims: [usize; 2],
+        barriers: usize,
+        is_fresh: bool,
+        horizon: Option<f64>,
+    ) -> Result<(), Error> {
+        let Commitment {
+            standing,
+            promises,
+            plan,
+            lost,
+            regained,
+            share,
+            way,
+            prolong_at,
+            sample,
+            interval,
+            ..
+        } = self;
+        let refuse = |field: &str, message: &str| Err(Error::new(ErrorKind::Dimension, field, message));
+        if *standing != Standing::Undecided {
+            length("promises", promises.len(), barriers)?;
+        }
+        if *standing == Standing::Undecided && !is_fresh {
+            return refuse("standing", "is undecided, beside samples that were decided on");
+        }
+        if self.is_followed() || *standing == Standing::Undecided && !plan.is_empty() {
+            if let Some(flaw) = plan.flaw(dims) {
+                return refuse("plan", flaw);
+            }
+            if !(0.0..=1.0).contains(share) {
+                return refuse("share", "is no part, must be 0 to 1");
+            }
+            if way.is_flawed() || regained.is_flawed() {
+                return refuse("way", "is none of a filter, or not finite");
+            }
+            if prolong_at.is_nan() || plan.is_finite() && horizon.is_none() {
+                return refuse("plan", "ends without a rest, which needs a horizon and a time to prolong it");
+            }
+            let is_promise = |p: &Promise| {
+                let is_timed = p.from.is_finite() && p.firm.is_finite() && !p.until.is_nan();
+                is_timed && p.margin >= 0.0 && p.reserve >= 0.0
+            };
+            if !promises.iter().flatten().all(is_promise) {
+                return refuse("promises", "have a time or a margin that is no number");
+            }
+            if !sample.is_some_and(|[t, hold]| t.is_finite() && hold.is_finite() && hold > 0.0) {
+                return refuse("sample", "has no time, must have one beside a plan");
+            }
+            if self.is_followed() && !self.deviation.fits(dims[0]) {
+                return refuse("deviation", "is none of a plant with as many states");
+            }
+            if !interval.is_finite() {
+                return refuse("interval", "is not finite");
+            }
+            if lost.iter().flatten().any(|t| !t.is_finite()) {
+                return refuse("lost", "is at a time that is not finite");
+            }
+        }
+        Ok(())
+    }
+}
+
+/// h ≥ 0 from one time in s until another, and the margin that plans keep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Promise {
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    pub(super) from: f64,
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    pub(super) until: f64,
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    pub(super) margin: f64,
+    /// From when in s it has to be there: what begins at the edge of its set has a period to leave it.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    pub(super) firm: f64,
+    /// What new plans keep, ≥ 0: a reserve where it is more than the margin.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    pub(super) reserve: f64,
+}
+
+/// Whether two intervals of a clock that is measured are meant to be the same.
+pub(super) fn is_like(interval: f64, other: f64) -> bool {
+    (interval - other).abs() <= JITTER * other
+}

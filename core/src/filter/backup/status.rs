@@ -1,0 +1,116 @@
+//! What a filter with plans says of a step: whether its promises are kept, who chose the input, and why.
+
+use crate::plan::Failure;
+
+/// Who chose the input of a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+#[non_exhaustive]
+pub enum Driver {
+    /// u_ref, with a comfortable plan behind it: the one at hand, that moved in time, or another.
+    Reference,
+    /// The rows of the filter inside, with a plan behind their answer; or the rows alone, where there is no promise.
+    #[default]
+    Rows,
+    /// As near to u_ref as its bounds, or the rows and a comfortable plan, allow.
+    Eased,
+    /// A compromise between the plan's own input and u_ref, or the answer of the rows where every set has been reached, or an input
+    /// that does not jump from the last one; with a plan behind it.
+    Between,
+    /// The plan: nothing else keeps the promise.
+    Plan,
+}
+
+/// Where the promise of a filter with [plans](super::Plans) stands. The numbers are stable: they leave the library as the FMU's
+/// `assurance`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+#[non_exhaustive]
+#[repr(u8)]
+pub enum Standing {
+    /// No sample yet.
+    #[default]
+    Undecided = 0,
+    /// Every promise is kept: there is a witness.
+    Assured = 1,
+    /// Refused at the first sample: no plan was found. The filter goes on by its rows, without promise.
+    Refused = 2,
+    /// Was assured, and is not now: the plant is not where the model led. Until something promised is missed the promise is
+    /// taken up again at the first sample from which a plan keeps it.
+    Withdrawn = 3,
+    /// Was assured, and is not now: a sample came later than the hold of the one before, or earlier and no plan was found
+    /// from there. It is taken up again as one that is withdrawn, after a late sample at the next one in time.
+    Irregular = 4,
+    /// Was assured until a time, which has come: no plan was found beyond it. It is taken up again as one that is withdrawn.
+    Expired = 5,
+}
+
+impl Standing {
+    /// Every standing, in the order of its number.
+    pub const ALL: [Self; 6] =
+        [Self::Undecided, Self::Assured, Self::Refused, Self::Withdrawn, Self::Irregular, Self::Expired];
+
+    /// Its name, as the FMU's enumeration has it.
+    pub fn name(self) -> &'static str {
+        self.words().0
+    }
+
+    /// Its meaning, in a few words.
+    pub fn meaning(self) -> &'static str {
+        self.words().1
+    }
+
+    fn words(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Undecided => ("undecided", "no step with a valid state yet, or not armed"),
+            Self::Assured => ("assured", "a plan keeps every promise, whatever u_ref is"),
+            Self::Refused => ("refused", "no plan was found at the start: nothing is promised"),
+            Self::Withdrawn => ("withdrawn", "was assured: the plant is not where the model led"),
+            Self::Irregular => {
+                ("irregular", "was assured: a step came late, or early without a plan from there")
+            }
+            Self::Expired => ("expired", "was assured until now: no plan was found beyond"),
+        }
+    }
+}
+
+/// Why u_ref was changed: with it held until the next sample, and the plan followed then, this barrier would be broken, or come
+/// nearest to its edge where that is merely uncomfortable.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Reason {
+    /// The number of the barrier.
+    pub barrier: usize,
+    /// When, in s.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    pub time: f64,
+}
+
+/// What a filter with plans says of a step ([`Report::assurance`](crate::filter::Report::assurance)).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub struct Assurance {
+    /// Where the promise stands.
+    pub standing: Standing,
+    /// Who chose the input.
+    pub driver: Driver,
+    /// Why there is no plan, where the promise was refused, withdrawn, or has come to its end.
+    pub failure: Option<Failure>,
+    /// The time in s until which every promise is kept, infinite for ever; `None` where nothing is assured. Once given, it
+    /// never goes back.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    pub until: Option<f64>,
+    /// Why u_ref was changed, as seen when it last passed no more; `None` where it was not, or for its bounds alone, or where
+    /// nothing is assured.
+    pub reason: Option<Reason>,
+}
+
+impl Assurance {
+    /// Whether every promise is kept, whatever u_ref is.
+    pub fn is_assured(&self) -> bool {
+        self.standing == Standing::Assured
+    }
+}

@@ -1,0 +1,103 @@
+//! What a filter remembers between samples.
+
+use alloc::vec::Vec;
+
+#[cfg(feature = "plan")]
+use super::backup::Commitment;
+use super::{Bend, SAME_TIME};
+use crate::MAX_INPUTS;
+use crate::convergence::FixedTimeState;
+
+/// The memory of a filter between samples: one promise per barrier, the times that [`Sampling`](super::Sampling) needs, where the
+/// search for the next input begins, the integrated input and the backup plan.
+///
+/// With the feature `serde` it can be written to a file, bit for bit (serde_json needs its feature `float_roundtrip` for
+/// that). Infinities are words in formats for people, as JSON has none. [`Filter::restore`](super::Filter::restore) checks what is
+/// read.
+#[derive(Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct FilterState {
+    /// Promises, in the order of the barriers.
+    pub barriers: Vec<FixedTimeState>,
+    /// Time of the last sample with valid inputs, in s.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    pub time: Option<f64>,
+    /// The measured sampling period in s, under [`Sampling::Measured`](super::Sampling::Measured) from the second sample on.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    pub period: Option<f64>,
+    /// The input returned at [`Self::time`], or last while not armed; zeros above the number of inputs.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    pub input: [f64; MAX_INPUTS],
+    /// Time of the first sample in s, valid or not, where the filter is [armed later](super::FilterBuilder::arm_after) than that.
+    #[cfg_attr(feature = "serde", serde(default, with = "crate::real"))]
+    pub start: Option<f64>,
+    /// How the active row bent at the sample before [`Self::time`] and at that, where one alone was active: the search over the
+    /// period begins from the former if that sample is taken again, else from the latter. Promises do not depend on it.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub bends: [Option<Bend>; 2],
+    /// The [integrated input](super::Integration) at the end of the last hold, in its unit; 0 where no input is integrated.
+    #[cfg_attr(feature = "serde", serde(default, with = "crate::real"))]
+    pub integrated: f64,
+    /// The backup plan and what it keeps; blank where the filter follows no plans.
+    #[cfg(feature = "plan")]
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub plan: Commitment,
+}
+
+impl Clone for FilterState {
+    fn clone(&self) -> Self {
+        let mut clone = Self::default();
+        clone.clone_from(self);
+        clone
+    }
+
+    /// Reuses the memory, which a derived `Clone` would not: only a plan allocates.
+    fn clone_from(&mut self, source: &Self) {
+        self.clone_rows_from(source);
+        #[cfg(feature = "plan")]
+        self.plan.clone_from(&source.plan);
+    }
+}
+
+impl FilterState {
+    /// Becomes `source` but for the plan, without allocating.
+    pub(super) fn clone_rows_from(&mut self, source: &Self) {
+        // Without `..`: a new field does not compile here until it is decided whether it belongs to a sample of the rows.
+        let Self {
+            barriers,
+            time,
+            period,
+            input,
+            start,
+            bends,
+            integrated,
+            #[cfg(feature = "plan")]
+                plan: _,
+        } = source;
+        self.barriers.clone_from(barriers);
+        (self.time, self.period, self.input, self.start) = (*time, *period, *input, *start);
+        (self.bends, self.integrated) = (*bends, *integrated);
+    }
+
+    /// Whether a filter that is armed `after` seconds from its first sample is so at `t`: once it is, it stays so.
+    #[inline]
+    pub(super) fn is_armed(&self, t: f64, after: f64) -> bool {
+        let reached = |start: f64| t - start >= after - SAME_TIME * t.abs().max(after);
+        after == 0.0 || self.time.is_some() || self.start.is_none_or(reached)
+    }
+
+    /// The bend of the active row from which the search at `t` begins.
+    #[inline]
+    pub(super) fn bend_before(&self, t: f64) -> &Option<Bend> {
+        let [before, last] = &self.bends;
+        if self.time.is_some_and(|time| t > time) { last } else { before }
+    }
+
+    /// Becomes `next` but for the plan; `next` keeps memory alone.
+    #[inline(always)]
+    pub(super) fn take_rows(&mut self, next: &mut Self) {
+        core::mem::swap(&mut self.barriers, &mut next.barriers);
+        (self.time, self.period, self.input, self.start) = (next.time, next.period, next.input, next.start);
+        (self.bends, self.integrated) = (next.bends, next.integrated);
+    }
+}
