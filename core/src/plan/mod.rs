@@ -10,6 +10,7 @@
 //! |---|---|
 //! | `model` | the plant run ahead, its linearisation by differences, the rest near a state |
 //! | `law` | feedback that stops the plant, and feedback that follows a reference |
+//! | `witness`, `failure` | a verified list of inputs; why there is none |
 //! | `check` | the exact check: a roll-out that meets every requirement, between its nodes too |
 //! | `course` | polynomials in time, and what they do not fall below |
 //! | `integral` | the mean of an integral over each period, and its limits |
@@ -20,18 +21,21 @@
 
 mod check;
 mod course;
+mod failure;
 mod integral;
 mod law;
 mod model;
 mod planner;
 mod search;
+mod witness;
 
 pub(crate) use check::ON_TIME;
-pub use check::{Failure, Tightest, Witness};
+pub use failure::Failure;
 pub use integral::Integral;
 pub(crate) use integral::Limit;
 pub(crate) use model::slopes;
 pub use planner::{Planner, Sought};
+pub use witness::{Tightest, Witness};
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;

@@ -6,11 +6,11 @@ use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::check::{Failure, Grid, Walk, Witness};
+use super::check::{Grid, Walk};
 use super::law::{Brake, Gain, Reference};
 use super::model::{Model, slopes};
 use super::search::{Descent, Search, Trajectory};
-use super::{Integral, Plan, Policy, Requirement};
+use super::{Failure, Integral, Plan, Policy, Requirement, Witness};
 use crate::lie::Predict;
 use crate::qp::Bounds;
 use crate::{MAX_INPUTS, elementary};

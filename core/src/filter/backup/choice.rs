@@ -3,7 +3,8 @@
 use super::planning::{AMPLE, Planning};
 use super::{Driver, Reason, Standing};
 use crate::MAX_INPUTS;
-use crate::plan::{Failure, Plan, Planner, Sought, Tightest, Witness};
+use crate::filter::rows::Rows;
+use crate::plan::{Failure, Plan, Planner, Sought, Witness};
 use crate::scalar::all_finite;
 
 /// Largest input of a plan that is comfortable where every set has been reached, as a part of its bounds.
@@ -160,9 +161,28 @@ pub(super) struct Wish<'a> {
     pub(super) reached: bool,
 }
 
+/// The candidates for the input of a sample, and what they are judged by.
+struct Choice<'a, 'p> {
+    planning: &'a Planning<'a>,
+    planner: &'a Planner<'p>,
+    t: f64,
+    x: &'a [f64],
+    wish: Wish<'a>,
+    /// The plan at hand, and the part of the last input that was its own.
+    plan: &'a Plan,
+    share: f64,
+    /// Whether u_ref is a number; whether the plan has no part in the input, so that u_ref passes where it may.
+    is_wish: bool,
+    passes: bool,
+    /// The largest input of a plan that is comfortable, as a part of its bounds.
+    comfort: f64,
+    /// Whether u_ref had the last sample.
+    wished: bool,
+}
+
 impl Planning<'_> {
-    /// The input from `x` at `t`: u_ref where a comfortable plan stands behind it, be it the one at hand or another; else as far
-    /// towards it from the plan's own as one does. Where every set has been reached the answer of the rows comes in between.
+    /// The input from `x` at `t`, the first of these that has a plan behind it: u_ref, with a comfortable plan; where every set has
+    /// been reached the answer of the rows; else as far towards u_ref or the rows from the plan's own input as one goes.
     ///
     /// # Errors
     ///
@@ -171,160 +191,24 @@ impl Planning<'_> {
         &self,
         planner: &Planner<'_>,
         (t, x): (f64, &[f64]),
-        Wish { wish, wanted, rows, reached }: Wish<'_>,
+        wish: Wish<'_>,
         way: &mut Way,
     ) -> Result<Chosen, Failure> {
-        let (plan, share) = (&self.now().plan, self.before().share);
-        let (is_wish, passes) = (all_finite(wish), share <= GIVEN_BACK);
+        let share = self.before().share;
+        let (is_wish, passes) = (all_finite(wish.wish), share <= GIVEN_BACK);
         if is_wish && passes {
-            way.eagerness = way.eagerness.max(self.bounds.part(wanted));
+            way.eagerness = way.eagerness.max(self.bounds.part(wish.wanted));
         }
-        let comfort = if reached { COMFORTABLE } else { way.ease.max(EAGER * way.eagerness) };
-        // Where every set has been reached, with the margin that the rows aim at and gently, as long as u_ref has its way; where the
-        // rows took over they let it pass, or it is far from every edge.
-        let margin = |at: &Tightest| {
-            let kept = self.now().promises[at.barrier].map_or(0.0, |promise| promise.margin);
-            self.rows.slots[at.barrier].promise.settings().margin.max((AMPLE - 1.0) * kept)
-        };
-        let wished = way.wished;
-        let comfortable = |witness: &Witness| {
-            let is_gentle = witness.effort <= comfort;
-            if !reached {
-                return is_gentle;
-            }
-            let least = |at: &Tightest| match (wished, is_gentle) {
-                (true, true) => 0.0,
-                (true, false) => FAR[0] * self.rows.workspace.report.barriers[at.barrier].h,
-                (false, _) => FAR[1] * self.rows.workspace.report.barriers[at.barrier].h,
-            };
-            witness.tightest.is_none_or(|at| at.slack >= least(&at).max(margin(&at)))
-        };
-        let behind = |plan: &Plan, u: &[f64]| planner.behind(plan, t, x, u).ok();
-        let passed = if wanted == wish { Driver::Reference } else { Driver::Eased };
-        if is_wish && passes {
-            let driver = passed;
-            let chosen = |witness, plan| Chosen { driver, piece: Piece::WISH, share: 0.0, witness, plan };
-            let near = planner.behind(plan, t, x, wanted);
-            way.reason = match &near {
-                Ok(witness) => witness.tightest.map(|at| Reason { barrier: at.barrier, time: at.time }),
-                Err(Failure::Broken { barrier, time, .. }) => Some(Reason { barrier: *barrier, time: *time }),
-                Err(_) => None,
-            };
-            let is_near = near.is_ok();
-            if let Some(witness) = near.ok().filter(comfortable) {
-                way.reason = None;
-                return Ok(chosen(witness, None));
-            }
-            if !reached && !is_near {
-                let found = planner.moved(plan, t, x, wanted).ok().filter(|plan| comfortable(&plan.witness));
-                let found = found.or_else(|| self.sought(planner, (t, x), wanted, way, comfort));
-                if let Some(plan) = found {
-                    return Ok(chosen(plan.witness.clone(), Some(plan)));
-                }
-            }
+        let comfort = if wish.reached { COMFORTABLE } else { way.ease.max(EAGER * way.eagerness) };
+        let (planning, plan, wished) = (self, &self.now().plan, way.wished);
+        let choice = Choice { planning, planner, t, x, wish, plan, share, is_wish, passes, comfort, wished };
+        if let Some(chosen) = choice.u_ref(way).or_else(|| choice.rows()) {
+            return Ok(chosen);
         }
-        if reached
-            && passes
-            && let Some(witness) = behind(plan, rows)
-        {
-            let chosen = |driver, wish, witness| Chosen {
-                driver,
-                piece: Piece::mixed(1.0 - wish, wish),
-                share: 0.0,
-                witness,
-                plan: None,
-            };
-            if !is_wish || wanted != wish || !comfortable(&witness) || rows == wish {
-                return Ok(chosen(Driver::Rows, 0.0, witness));
-            }
-            // As near to u_ref as is comfortable, so that the input does not jump between the two.
-            let (wish, witness) = towards(rows, wish, witness, |u| behind(plan, u).filter(comfortable));
-            return Ok(chosen(if wish > 0.0 { Driver::Eased } else { Driver::Rows }, wish, witness));
-        }
-        // From the plan's own input: as near as can be at first, then as near as last, or a little more or less.
-        let kept = match planner.tail(plan, t, x) {
-            Ok(kept) => kept,
+        match planner.tail(plan, t, x) {
+            Ok(kept) => Ok(choice.from_plan(kept, way)),
             // The plant is not where the plan was: whatever else there is keeps the promise.
-            Err(failure) => {
-                let wished = is_wish.then_some((passed, Piece::WISH, wanted));
-                let others = wished.into_iter().chain([(Driver::Rows, Piece::ROWS, rows)]);
-                let mut others =
-                    others.filter_map(|(driver, piece, u)| Some((driver, piece, behind(plan, u)?)));
-                let (driver, piece, witness) = others.next().ok_or(failure)?;
-                return Ok(Chosen { driver, piece, share: 0.0, witness, plan: None });
-            }
-        };
-        let (own, to_rows) = (kept.inputs[0].1, reached || !is_wish);
-        let far = if to_rows { rows } else { wanted };
-        let mixed = |share: f64, witness, plan| {
-            let part = 1.0 - share;
-            let piece = if to_rows { Piece::mixed(part, 0.0) } else { Piece::mixed(0.0, part) };
-            let driver = match share {
-                0.0 if to_rows => Driver::Rows,
-                0.0 => passed,
-                1.0 => Driver::Plan,
-                _ => Driver::Between,
-            };
-            Chosen { driver, piece, share, witness, plan }
-        };
-        let between = |share: f64| -> [f64; MAX_INPUTS] {
-            // All of it is itself, to the last bit.
-            let part =
-                |i: usize| if share == 0.0 { far[i] } else { own[i] + (1.0 - share) * (far[i] - own[i]) };
-            core::array::from_fn(|i| if i < far.len() { part(i) } else { 0.0 })
-        };
-        let most = kept.effort.max(comfort);
-        let gentle = |witness: &Witness| witness.effort <= most;
-        if passes {
-            let (part, witness) = towards(&own[..far.len()], far, kept, |u| behind(plan, u).filter(gentle));
-            return Ok(mixed(1.0 - part, witness, None));
-        }
-        let returned = (share - RETURNED * GIVEN_BACK).max(0.0);
-        let gentler = (GENTLER * comfort).max(way.eagerness);
-        if !to_rows && let Some(other) = self.sought(planner, (t, x), wanted, way, gentler) {
-            // At once where the two plans lead apart.
-            let gently = behind(&other, &between(returned)[..far.len()]).map(|witness| (returned, witness));
-            let (share, witness) = gently.unwrap_or((0.0, other.witness.clone()));
-            return Ok(mixed(share, witness, Some(other)));
-        }
-        let shares = SHARES.map(|more| share + more * GIVEN_BACK).into_iter().filter(|share| *share < 1.0);
-        let first = way.returns.then_some(returned);
-        // On the way to a deadline the plan gives back to another one alone: u_ref leads off it.
-        let shares = shares.skip(usize::from(!to_rows || way.held > 0));
-        let found = first.into_iter().chain(shares).find_map(|share| {
-            let witness = behind(plan, &between(share)[..far.len()]).filter(gentle)?;
-            Some((share, witness))
-        });
-        let (share, witness) = found.unwrap_or((1.0, kept));
-        way.held = if share > self.before().share { HELD } else { way.held.saturating_sub(1) };
-        if first.is_some_and(|first| share > first) {
-            (way.returns, way.wait) = (false, way.wait.max(way.pause));
-        }
-        Ok(mixed(share, witness, None))
-    }
-
-    /// A plan behind `u` that needs no more than `comfort` where one is sought at this sample, and is found.
-    fn sought(
-        &self,
-        planner: &Planner<'_>,
-        (t, x): (f64, &[f64]),
-        u: &[f64],
-        way: &mut Way,
-        comfort: f64,
-    ) -> Option<Plan> {
-        if way.wait > 0 {
-            return None;
-        }
-        match planner.renewed(&self.now().plan, t, x, u, &mut way.sought) {
-            Ok(plan) if plan.witness.effort <= comfort => {
-                way.find(self.before().share > GIVEN_BACK);
-                Some(plan)
-            }
-            Ok(_) | Err(false) => {
-                way.give_up();
-                None
-            }
-            Err(true) => None,
+            Err(failure) => choice.any_other().ok_or(failure),
         }
     }
 
@@ -361,6 +245,171 @@ impl Planning<'_> {
         match may_renew.then(renewed).flatten() {
             Some(plan) => Chosen { driver, piece, witness: plan.witness.clone(), plan: Some(plan), ..chosen },
             None => chosen,
+        }
+    }
+}
+
+impl Choice<'_, '_> {
+    fn behind(&self, plan: &Plan, u: &[f64]) -> Option<Witness> {
+        self.planner.behind(plan, self.t, self.x, u).ok()
+    }
+
+    /// Who chose u_ref within its bounds.
+    fn passed(&self) -> Driver {
+        if self.wish.wanted == self.wish.wish { Driver::Reference } else { Driver::Eased }
+    }
+
+    /// Whether a plan is comfortable. Where every set has been reached: with the margin that the rows aim at and gently, as long as
+    /// u_ref has its way; where the rows took over they let it pass, or it is far from every edge.
+    fn is_comfortable(&self, witness: &Witness) -> bool {
+        let is_gentle = witness.effort <= self.comfort;
+        let Some(at) = witness.tightest.filter(|_| self.wish.reached) else {
+            return is_gentle || self.wish.reached;
+        };
+        let Rows { slots, workspace, .. } = self.planning.rows;
+        let kept = self.planning.now().promises[at.barrier].map_or(0.0, |promise| promise.margin);
+        let margin = slots[at.barrier].promise.settings().margin.max((AMPLE - 1.0) * kept);
+        let h = workspace.report.barriers[at.barrier].h;
+        let least = match (self.wished, is_gentle) {
+            (true, true) => 0.0,
+            (true, false) => FAR[0] * h,
+            (false, _) => FAR[1] * h,
+        };
+        at.slack >= least.max(margin)
+    }
+
+    /// u_ref as it is or within its bounds, with a comfortable plan behind it: the one at hand, that moved in time, or another. Notes
+    /// why not.
+    fn u_ref(&self, way: &mut Way) -> Option<Chosen> {
+        if !(self.is_wish && self.passes) {
+            return None;
+        }
+        let (planner, plan, wanted) = (self.planner, self.plan, self.wish.wanted);
+        let driver = self.passed();
+        let chosen = |witness, plan| Chosen { driver, piece: Piece::WISH, share: 0.0, witness, plan };
+        let near = planner.behind(plan, self.t, self.x, wanted);
+        way.reason = match &near {
+            Ok(witness) => witness.tightest.map(|at| Reason { barrier: at.barrier, time: at.time }),
+            Err(Failure::Broken { barrier, time, .. }) => Some(Reason { barrier: *barrier, time: *time }),
+            Err(_) => None,
+        };
+        if let Ok(witness) = near {
+            let is_comfortable = self.is_comfortable(&witness);
+            way.reason = way.reason.filter(|_| !is_comfortable);
+            return is_comfortable.then(|| chosen(witness, None));
+        }
+        if self.wish.reached {
+            return None;
+        }
+        let moved = planner.moved(plan, self.t, self.x, wanted).ok();
+        let moved = moved.filter(|plan| self.is_comfortable(&plan.witness));
+        let plan = moved.or_else(|| self.sought(wanted, way, self.comfort))?;
+        Some(chosen(plan.witness.clone(), Some(plan)))
+    }
+
+    /// The answer of the rows where every set has been reached, or as near to u_ref from it as is comfortable, so that the input does not
+    /// jump between the two.
+    fn rows(&self) -> Option<Chosen> {
+        if !(self.wish.reached && self.passes) {
+            return None;
+        }
+        let Wish { wish, wanted, rows, .. } = self.wish;
+        let witness = self.behind(self.plan, rows)?;
+        let chosen = |driver, wish, witness| Chosen {
+            driver,
+            piece: Piece::mixed(1.0 - wish, wish),
+            share: 0.0,
+            witness,
+            plan: None,
+        };
+        if !self.is_wish || wanted != wish || !self.is_comfortable(&witness) || rows == wish {
+            return Some(chosen(Driver::Rows, 0.0, witness));
+        }
+        let comfortable =
+            |u: &[f64]| self.behind(self.plan, u).filter(|witness| self.is_comfortable(witness));
+        let (wish, witness) = towards(rows, wish, witness, comfortable);
+        Some(chosen(if wish > 0.0 { Driver::Eased } else { Driver::Rows }, wish, witness))
+    }
+
+    /// u_ref or the answer of the rows with any plan behind it.
+    fn any_other(&self) -> Option<Chosen> {
+        let wished = self.is_wish.then_some((self.passed(), Piece::WISH, self.wish.wanted));
+        let mut others = wished.into_iter().chain([(Driver::Rows, Piece::ROWS, self.wish.rows)]);
+        let (driver, piece, witness) =
+            others.find_map(|(driver, piece, u)| Some((driver, piece, self.behind(self.plan, u)?)))?;
+        Some(Chosen { driver, piece, share: 0.0, witness, plan: None })
+    }
+
+    /// From the plan's own input, that of `kept`, towards u_ref or the rows: as near as can be at first, then as near as last, or a little
+    /// more or less.
+    fn from_plan(&self, kept: Witness, way: &mut Way) -> Chosen {
+        let to_rows = self.wish.reached || !self.is_wish;
+        let (own, far) = (kept.inputs[0].1, if to_rows { self.wish.rows } else { self.wish.wanted });
+        let mixed = |share: f64, witness, plan| {
+            let part = 1.0 - share;
+            let piece = if to_rows { Piece::mixed(part, 0.0) } else { Piece::mixed(0.0, part) };
+            let driver = match share {
+                0.0 if to_rows => Driver::Rows,
+                0.0 => self.passed(),
+                1.0 => Driver::Plan,
+                _ => Driver::Between,
+            };
+            Chosen { driver, piece, share, witness, plan }
+        };
+        let most = kept.effort.max(self.comfort);
+        let gentle = |witness: &Witness| witness.effort <= most;
+        if self.passes {
+            let behind = |u: &[f64]| self.behind(self.plan, u).filter(gentle);
+            let (part, witness) = towards(&own[..far.len()], far, kept, behind);
+            return mixed(1.0 - part, witness, None);
+        }
+        let between = |share: f64| -> [f64; MAX_INPUTS] {
+            // All of it is itself, to the last bit.
+            let part =
+                |i: usize| if share == 0.0 { far[i] } else { own[i] + (1.0 - share) * (far[i] - own[i]) };
+            core::array::from_fn(|i| if i < far.len() { part(i) } else { 0.0 })
+        };
+        let returned = (self.share - RETURNED * GIVEN_BACK).max(0.0);
+        let gentler = (GENTLER * self.comfort).max(way.eagerness);
+        if !to_rows && let Some(other) = self.sought(self.wish.wanted, way, gentler) {
+            // At once where the two plans lead apart.
+            let gently = self.behind(&other, &between(returned)[..far.len()]);
+            let (share, witness) =
+                gently.map_or_else(|| (0.0, other.witness.clone()), |witness| (returned, witness));
+            return mixed(share, witness, Some(other));
+        }
+        let shares =
+            SHARES.map(|more| self.share + more * GIVEN_BACK).into_iter().filter(|share| *share < 1.0);
+        let first = way.returns.then_some(returned);
+        // On the way to a deadline the plan gives back to another one alone: u_ref leads off it.
+        let shares = shares.skip(usize::from(!to_rows || way.held > 0));
+        let found = first.into_iter().chain(shares).find_map(|share| {
+            let witness = self.behind(self.plan, &between(share)[..far.len()]).filter(gentle)?;
+            Some((share, witness))
+        });
+        let (share, witness) = found.unwrap_or((1.0, kept));
+        way.held = if share > self.share { HELD } else { way.held.saturating_sub(1) };
+        if first.is_some_and(|first| share > first) {
+            (way.returns, way.wait) = (false, way.wait.max(way.pause));
+        }
+        mixed(share, witness, None)
+    }
+
+    /// A plan behind `u` that needs no more than `comfort` where one is sought at this sample, and is found.
+    fn sought(&self, u: &[f64], way: &mut Way, comfort: f64) -> Option<Plan> {
+        if way.wait > 0 {
+            return None;
+        }
+        match self.planner.renewed(self.plan, self.t, self.x, u, &mut way.sought) {
+            Ok(plan) if plan.witness.effort <= comfort => {
+                way.find(self.share > GIVEN_BACK);
+                Some(plan)
+            }
+            Ok(_) | Err(false) => {
+                way.give_up();
+                None
+            }
+            Err(true) => None,
         }
     }
 }

@@ -6,9 +6,10 @@ use alloc::vec::Vec;
 
 use super::{Guide, Planner, RESOLVED, ROOM, SEARCHED, UNDATED, WORTH};
 use crate::MAX_INPUTS;
-use crate::plan::check::{Failure, Grid, Witness};
+use crate::plan::check::Grid;
 use crate::plan::law::Reference;
 use crate::plan::search::{Descent, Search};
+use crate::plan::{Failure, Witness};
 use crate::plan::{Plan, Requirement};
 use crate::scalar::all_finite;
 

@@ -1,0 +1,458 @@
+//! The exact check: the plant run ahead under a law, with every requirement looked at, between the nodes too.
+//!
+//! Under one input, state and h are followed by their Taylor [courses](crate::lie::Course) in pieces. A piece ends where the
+//! last terms of a state no longer vanish, and is halved until the course of every state is a solution on all of it: by
+//! [enclosures](crate::interval) of the plant's rate there. Where a source has none, in its middle and at its end, and it is
+//! assumed that what bends the plant shows there.
+//!
+//! On a piece h has a lower bound: the least Bernstein coefficient of its course, which none of its values falls below,
+//! less its last terms and less four times what the course misses h by at four instants. What bends h between them shows in
+//! enclosures: of h on the piece, or of the last coefficient of a course that begins anywhere on it, which by Taylor's theorem
+//! is all that the others leave open. Where these do not decide, the piece is halved for this h. Where a source has no
+//! enclosures, it is assumed that h bends as those instants show.
+//!
+//! | module | owns |
+//! |---|---|
+//! | here | the roll-out: holds, pieces, and what h does not fall below on each |
+//! | `perturbed` | a plant beside that of the roll-out: whether a deviation too small to measure grows |
+//! | `terminal` | the end: whether the plant stays at an equilibrium for ever, or how a plan ends without one |
+//! | `motion` | how what has nearly died away goes on to move |
+
+mod motion;
+mod perturbed;
+mod terminal;
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::course::{self, at, shifted};
+use super::law::Reference;
+use super::model::Model;
+use super::witness::{Tightest, Witness};
+use super::{Failure, Integral, Requirement};
+use crate::MAX_INPUTS;
+use crate::interval::Interval;
+use crate::lie::{COURSE, Course, CourseOver, FEW_ORDERS, RateOver};
+use crate::scalar::all_finite;
+use perturbed::{Aside, SPREADS};
+
+/// Most pieces of a roll-out.
+const MOST_PIECES: u32 = 100_000;
+/// The last terms of a state's course at the end of a piece, as a part of its size.
+const TRUNCATED: f64 = 1e-10;
+/// By how much the course of a state may miss being a solution over the piece, as a part of its change there and beside 1.
+const RESIDUAL: f64 = 1e-8;
+/// Coefficients of the rate of the states that bound this: first few, then all.
+const ORDERS: [usize; 2] = [FEW_ORDERS, COURSE - 1];
+/// How much longer than a piece that has been halved the next may be. The one after that by the square of it, and so on.
+const LONGER: f64 = 1.2;
+/// The margin at the edge of a set, in units of that inside: what round-off may miss.
+const EDGE: f64 = -1e-6;
+/// Halvings of a piece whose bound does not decide, and of those the ones that may only make it sharper.
+const HALVINGS: u32 = 14;
+const SHARPER: u32 = 3;
+/// The bound of a piece that is sharp enough, as a part of the least value seen.
+const SHARP: f64 = 0.8;
+/// Instants of a piece at which its course is compared with h, and what a difference there counts for between them.
+const INSTANTS: u32 = 4;
+const MISSED: f64 = 4.0;
+/// Change of a state over a hold that is round-off, as a part of its size.
+pub(super) const ROUND_OFF: f64 = 16.0 * f64::EPSILON;
+/// Difference of a sample from its time that counts as none, as a part of the period. Round-off of times is another.
+pub(crate) const ON_TIME: f64 = 1e-6;
+
+/// The samples of a roll-out.
+#[derive(Clone, Copy)]
+pub(super) struct Grid {
+    /// The time in s for which the input of the first one is held.
+    pub(super) period: f64,
+    /// Whether the others follow in the same period, so that inputs change then; else they come as the plan has them.
+    pub(super) even: bool,
+}
+
+impl Grid {
+    /// By how much an end lies past a sample at least, in s: what it is meant to be is not that sample.
+    pub(super) fn slack(&self) -> f64 {
+        self.period * if self.even { 0.5 } else { ON_TIME }
+    }
+}
+
+/// A roll-out in progress.
+pub(super) struct Walk<'a> {
+    model: Model<'a>,
+    requirements: &'a [Requirement<'a>],
+    /// What every margin is multiplied by.
+    strictness: f64,
+    t: f64,
+    x: Vec<f64>,
+    /// The courses of the states from here on, a state on them and its rate.
+    path: Vec<Course>,
+    point: Vec<f64>,
+    rate: Vec<f64>,
+    /// Enclosures of those courses and of the rate on a piece.
+    over: Vec<CourseOver>,
+    rate_over: Vec<RateOver>,
+    /// The courses beside those of the states.
+    beside: Vec<Course>,
+    pieces: u32,
+    /// The most of them.
+    pub(super) most_pieces: u32,
+    /// The longest piece in s to try, and how much longer the next one may be.
+    longest: f64,
+    growth: f64,
+    aside: Aside,
+    witness: Witness,
+    started: f64,
+    grid: Grid,
+}
+
+impl<'a> Walk<'a> {
+    /// Begins at `t` and `x`, where every requirement in force has to be met with `strictness` times its margin. Samples
+    /// are those of `grid`.
+    pub(super) fn new(
+        model: Model<'a>,
+        requirements: &'a [Requirement<'a>],
+        strictness: f64,
+        grid: Grid,
+        (t, x): (f64, &[f64]),
+    ) -> Result<Self, Failure> {
+        let mut walk = Self {
+            model,
+            requirements,
+            strictness,
+            t,
+            x: x.to_vec(),
+            path: vec![[0.0; COURSE]; x.len()],
+            point: x.to_vec(),
+            rate: x.to_vec(),
+            over: Vec::with_capacity(x.len()),
+            rate_over: vec![[Interval::ALL; COURSE - 1]; x.len()],
+            beside: vec![[0.0; COURSE]; x.len()],
+            pieces: 0,
+            most_pieces: MOST_PIECES,
+            longest: f64::INFINITY,
+            growth: LONGER,
+            aside: Aside::new(x),
+            witness: Witness { rates: vec![0.0; x.len()], is_even: grid.even, ..Witness::default() },
+            started: t,
+            grid,
+        };
+        for (i, requirement) in requirements.iter().enumerate() {
+            if requirement.is_in_force(t) {
+                walk.note(i, t, requirement.model.value(t, x))?;
+            }
+        }
+        Ok(walk)
+    }
+
+    /// Takes over the rates of the plan before.
+    pub(super) fn after(mut self, before: &Witness) -> Self {
+        for (rate, before) in self.witness.rates.iter_mut().zip(&before.rates) {
+            *rate = rate.max(*before);
+        }
+        self
+    }
+
+    /// The least value of requirement `i`. With less strictness the reserve may be used up.
+    fn least_of(&self, i: usize) -> f64 {
+        let is_new = self.strictness >= 1.0 && self.is_firm(i);
+        let reserve = if is_new { self.requirements[i].reserve } else { f64::NEG_INFINITY };
+        self.margin(i).max(reserve)
+    }
+
+    fn margin(&self, i: usize) -> f64 {
+        self.strictness * self.requirements[i].margin * if self.is_firm(i) { 1.0 } else { EDGE }
+    }
+
+    /// Whether the margin of requirement `i` has to be there.
+    fn is_firm(&self, i: usize) -> bool {
+        self.t >= self.requirements[i].firm
+    }
+
+    /// Notes that h of requirement `i` is at least `h` around `t`.
+    fn note(&mut self, i: usize, t: f64, h: f64) -> Result<(), Failure> {
+        let (barrier, missing) = (self.requirements[i].barrier, h - self.least_of(i));
+        // Not-a-number is broken too.
+        if missing.is_nan() || missing < 0.0 {
+            return Err(Failure::Broken { barrier, time: t, slack: missing });
+        }
+        let slack = h - self.margin(i);
+        let counts = !self.requirements[i].is_limit;
+        if counts && self.witness.tightest.is_none_or(|least| slack < least.slack) {
+            self.witness.tightest = Some(Tightest { barrier, time: t, slack });
+        }
+        Ok(())
+    }
+
+    /// Holds the input that `law` has here until `end`, or where samples are even and have come to lie elsewhere until the nearest.
+    fn hold_under(&mut self, law: impl Fn(&[f64], &mut [f64]), end: f64) -> Result<(), Failure> {
+        let m = self.model.inputs();
+        let (mut u, mut beside) = ([0.0; MAX_INPUTS], [0.0; MAX_INPUTS]);
+        law(&self.x, &mut u[..m]);
+        for (point, (x, d)) in self.point.iter_mut().zip(self.x.iter().zip(&self.aside.x)) {
+            *point = x + d;
+        }
+        law(&self.point, &mut beside[..m]);
+        self.aside.u = core::array::from_fn(|i| beside[i] - u[i]);
+        self.hold_until_sample(&u[..m], end)?;
+        let most = match self.strictness {
+            s if s >= 1.0 => SPREADS[0],
+            s if s > 0.0 => SPREADS[1],
+            _ => f64::INFINITY,
+        };
+        if self.aside.note(&self.x) <= most { Ok(()) } else { Err(Failure::Unsteady) }
+    }
+
+    /// The same of `u`, whatever the state is.
+    pub(super) fn hold_until(&mut self, u: &[f64], end: f64) -> Result<(), Failure> {
+        self.hold_under(|_, held| held.copy_from_slice(u), end)
+    }
+
+    /// Holds `u` until `end` or the nearest sample, and notes it.
+    fn hold_until_sample(&mut self, u: &[f64], end: f64) -> Result<(), Failure> {
+        let Grid { period, even } = self.grid;
+        let samples = ((end - self.started) / period + 0.5) as u64;
+        let sample = self.started + samples as f64 * period;
+        let end = if !even || (sample - end).abs() <= ON_TIME * period { end } else { sample };
+        // Time is too large to tell samples apart.
+        if end.is_nan() || end <= self.t {
+            return Err(Failure::TooLong);
+        }
+        self.hold(u, end)
+    }
+
+    /// Holds `u` until `end`.
+    fn hold(&mut self, u: &[f64], end: f64) -> Result<(), Failure> {
+        match self.model.integral {
+            None => self.move_to(u, end)?,
+            Some(integral) => self.integrate(u, integral, end)?,
+        }
+        let mut input = [0.0; MAX_INPUTS];
+        input[..u.len()].copy_from_slice(u);
+        if !self.witness.inputs.is_empty() {
+            self.witness.effort = self.witness.effort.max(self.model.bounds.part(u));
+        }
+        self.witness.inputs.push((end, input));
+        Ok(())
+    }
+
+    /// Moves on to `end` under `u`.
+    fn move_to(&mut self, u: &[f64], end: f64) -> Result<(), Failure> {
+        // Requirements begin, become firm and end at nodes.
+        while self.t < end {
+            let now = self.t;
+            let event = |node: f64, time: f64| if now < time && time < node { time } else { node };
+            let events = self.requirements.iter().flat_map(|r| [r.from, r.firm, r.until]);
+            let node = events.fold(end, event);
+            while self.t < node {
+                self.advance(u, node)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Moves on to `end` with the mean of the integral held over each period.
+    fn integrate(&mut self, u: &[f64], integral: Integral, end: f64) -> Result<(), Failure> {
+        let Integral { state, input } = integral;
+        let (rate, mut held) = (u[input], u.to_vec());
+        held[input] = 0.0;
+        let aside_rate = core::mem::take(&mut self.aside.u[input]);
+        self.witness.rates[state] = self.witness.rates[state].max(rate.abs());
+        let period = self.grid.period;
+        while self.t < end {
+            // The next sample; one that is here but for round-off has passed.
+            let passed = ((self.t - self.started) / period + 1e-6) as u64;
+            let sample = self.started + (passed + 1) as f64 * period;
+            let sample = if sample < end - 1e-6 * period { sample } else { end };
+            let (from, to) = (self.x[state], self.x[state] + rate * (sample - self.t));
+            let aside = 0.5 * (aside_rate * (sample - self.t));
+            self.x[state] = 0.5 * (from + to);
+            self.aside.x[state] += aside;
+            self.move_to(&held, sample)?;
+            self.aside.x[state] += aside;
+            self.x[state] = to;
+            for (i, requirement) in self.requirements.iter().enumerate() {
+                if requirement.is_in_force(sample) {
+                    let value = requirement.model.value(sample, &self.x);
+                    self.note(i, sample, value)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Moves on by a piece, to `node` at most.
+    fn advance(&mut self, u: &[f64], node: f64) -> Result<(), Failure> {
+        self.pieces += 1;
+        self.witness.pieces = self.pieces;
+        if self.pieces > self.most_pieces {
+            return Err(Failure::TooLong);
+        }
+        self.model.plant.path(&self.x, u, &mut self.path);
+        if !all_finite(self.path.as_flattened()) {
+            return Err(Failure::Singular);
+        }
+        let whole = node - self.t;
+        let mut dt = self.path.iter().fold(whole, |dt, c| course::reach(c, TRUNCATED * size(c), dt));
+        // Bends that have cut the piece before short are there still.
+        dt = dt.min(self.longest);
+        while !self.is_solution(u, dt) {
+            dt *= 0.5;
+            (self.longest, self.growth) = (dt, LONGER);
+            if self.t + dt <= self.t {
+                return Err(Failure::Singular);
+            }
+        }
+        if !self.is_smooth_beside(u) {
+            return Err(Failure::Singular);
+        }
+        self.longest *= self.growth;
+        self.growth *= self.growth;
+        let end = if dt < whole { self.t + dt } else { node };
+        // At a time so large that a piece is within its round-off.
+        if end <= self.t {
+            return Err(Failure::TooLong);
+        }
+        for (greatest, c) in self.witness.rates.iter_mut().zip(&self.path) {
+            *greatest = greatest.max(c[1].abs()).max(course::slope(c, dt).abs());
+        }
+        let (from, path, over) = (self.t, core::mem::take(&mut self.path), core::mem::take(&mut self.over));
+        let mut in_force = (0..self.requirements.len()).filter(|i| self.requirements[*i].is_in_force(from));
+        let met = in_force.try_for_each(|i| {
+            let least = self.least(i, (&path, &over), (from, dt), HALVINGS);
+            self.note(i, from, least)
+        });
+        // What has failed is not followed further.
+        if met.is_ok() {
+            self.move_aside(u, &path, dt);
+        }
+        for (x, c) in self.x.iter_mut().zip(&path) {
+            *x = at(c, dt);
+        }
+        (self.t, self.path, self.over) = (end, path, over);
+        met
+    }
+
+    /// Whether the courses of the states are a solution until `dt` s after their begin. Leaves what encloses them.
+    fn is_solution(&mut self, u: &[f64], dt: f64) -> bool {
+        let plant = self.model.plant;
+        self.over.clear();
+        self.over.extend(self.path.iter().map(|c| course::over(c, dt)));
+        // Not-a-number is not small.
+        let is_small = |missed: f64, over: &CourseOver| missed * dt <= allowed(over[0]);
+        for orders in ORDERS {
+            if !plant.rates_over(&self.over, u, orders, &mut self.rate_over) {
+                return [0.5 * dt, dt].into_iter().all(|after| {
+                    self.miss(u, after);
+                    self.rate.iter().zip(&self.over).all(|(missed, over)| is_small(*missed, over))
+                });
+            }
+            let mut rates = self.rate_over.iter().zip(&self.over);
+            if rates.all(|(rate, over)| is_small(course::missed(&rate[..orders], over, dt), over)) {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Writes what the course of each state misses its rate by `after` s after its begin to `rate`.
+    fn miss(&mut self, u: &[f64], after: f64) {
+        for (x, c) in self.point.iter_mut().zip(&self.path) {
+            *x = at(c, after);
+        }
+        self.model.plant.rate(&self.point, u, &mut self.rate);
+        for (rate, c) in self.rate.iter_mut().zip(&self.path) {
+            *rate = (course::slope(c, after) - *rate).abs();
+        }
+    }
+
+    /// A number that h of requirement `i` does not fall below along the first `dt` s of `path`, which begins at `from` and is
+    /// enclosed by `over`.
+    fn least(
+        &mut self,
+        i: usize,
+        (path, over): (&[Course], &[CourseOver]),
+        (from, dt): (f64, f64),
+        halvings: u32,
+    ) -> f64 {
+        let (model, margin, needed) = (self.requirements[i].model, self.margin(i), self.least_of(i));
+        let tightest = self.witness.tightest.map_or(f64::INFINITY, |tightest| tightest.slack);
+        // Far from its edge no more need be known.
+        let time = Interval::new(from, from + dt);
+        let lowest = model.value_over(time, over).map(|h| h.low);
+        if let Some(low) = lowest.filter(|low| *low >= needed && low - margin >= tightest) {
+            return low;
+        }
+        let mut h = [0.0; COURSE];
+        model.value_along(from, path, &mut h);
+        let (mut least, mut missed) = (h[0], 0.0_f64);
+        for k in 1..=INSTANTS {
+            let after = dt * f64::from(k) / f64::from(INSTANTS);
+            for (x, c) in self.point.iter_mut().zip(path) {
+                *x = at(c, after);
+            }
+            let value = model.value(from + after, &self.point);
+            if !value.is_finite() {
+                return f64::NEG_INFINITY;
+            }
+            (least, missed) = (least.min(value), missed.max((value - at(&h, after)).abs()));
+        }
+        let bound = course::least(&h, dt) - course::last_terms(&h, dt) - MISSED * missed;
+        let slack = bound - margin;
+        let is_sharp =
+            slack >= tightest || slack >= SHARP * (least - margin) || halvings + SHARPER <= HALVINGS;
+        if least < needed {
+            // By what is missing, and not by what a long piece leaves open.
+            return least;
+        }
+        if bound >= needed && is_sharp || halvings == 0 {
+            // Whatever bends h between these instants: by what it takes on the piece, or by Taylor's theorem.
+            let enclosed = lowest.filter(|low| *low < needed).map_or(f64::INFINITY, |low| {
+                h[COURSE - 1] = model.last_over(time, over).map_or(f64::NEG_INFINITY, |last| last.low);
+                low.max(course::least(&h, dt))
+            });
+            if enclosed >= needed || halvings == 0 {
+                return bound.min(least).min(enclosed);
+            }
+        }
+        // A half is as much work as a piece.
+        self.pieces += 1;
+        if self.pieces > self.most_pieces {
+            return f64::NEG_INFINITY;
+        }
+        let half = 0.5 * dt;
+        let enclosed = |path: &[Course]| path.iter().map(|c| course::over(c, half)).collect::<Vec<_>>();
+        let left = self.least(i, (path, &enclosed(path)), (from, half), halvings - 1);
+        if left < needed {
+            return left;
+        }
+        let path: Vec<Course> = path.iter().map(|c| shifted(c, half)).collect();
+        left.min(self.least(i, (&path, &enclosed(&path)), (from + half, half), halvings - 1))
+    }
+
+    /// Follows the rest of `reference`.
+    pub(super) fn follow(&mut self, reference: &Reference) -> Result<(), Failure> {
+        while let Some(k) = reference.hold_at(self.t, self.grid.slack()) {
+            let (model, t) = (self.model, self.t);
+            self.hold_under(|x, u| reference.input(&model, k, t, x, u), reference.times[k + 1])?;
+        }
+        Ok(())
+    }
+
+    /// Holds the input of `reference` here until `end`.
+    pub(super) fn follow_until(&mut self, reference: &Reference, end: f64) -> Result<(), Failure> {
+        let Some(k) = reference.hold_at(self.t, self.grid.slack()) else { return Ok(()) };
+        let (model, t) = (self.model, self.t);
+        self.hold_under(|x, u| reference.input(&model, k, t, x, u), end)
+    }
+}
+/// The error that a state may have on a piece where it is within `over`: far from the origin no more of it than near, but for
+/// round-off.
+fn allowed(over: Interval) -> f64 {
+    RESIDUAL * (1.0 + (over.high - over.low)) + ROUND_OFF * over.low.abs()
+}
+
+/// The size of a state, by which the last terms of its course are measured.
+fn size(course: &Course) -> f64 {
+    1.0 + course[0].abs()
+}

@@ -1,0 +1,312 @@
+//! The end of a plan: whether the plant stays for ever where the stopping law brings it to rest, or how the plan ends without a rest.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::motion::{Motion, way};
+use super::{ROUND_OFF, Walk, size};
+use crate::interval::Interval;
+use crate::lie::COURSE;
+use crate::plan::course::{self, at};
+use crate::plan::law::{Brake, Reference};
+use crate::plan::model::{differences, largest_eigenvalue};
+use crate::plan::witness::Witness;
+use crate::plan::{Failure, Integral, Requirement};
+
+/// Rate of the state that counts as rest, as a part of the largest on the way.
+const AT_REST: f64 = 1e-6;
+/// Number of holds for which a drift at rest has to leave every set where it is.
+const DRIFT: f64 = 1e3;
+/// Holds of the braking law in which what is left at a rest is followed.
+const SETTLING: usize = 128;
+/// Halvings of the way of the states that is left at a rest, on which h is enclosed.
+const WAY_HALVINGS: u32 = 6;
+/// What h changes by in one of them for that to be round-off, as a part of what it is made of.
+const SETTLED: f64 = 64.0 * f64::EPSILON;
+/// Part of a state's size by which it is moved to see whether a deviation from a rest grows, and by what part of it that may in
+/// all the time that is promised.
+const BESIDE: f64 = 1e-5;
+const GROWS: f64 = 0.1;
+/// Most pieces in which a hold of the braking law at a rest is followed, and the part of one that a kink is passed in.
+const CREPT: u32 = 1000;
+const KINK: f64 = 1.0 / 16.0;
+/// The time in s for which what does not die away has to leave every set where it is.
+const LONG: f64 = 1e5;
+/// Most holds of the braking law after a reference.
+const BRAKING: usize = 200;
+/// Later times at which a set that does not move has the same h: in units of the plan's length, and in s.
+const LATER: [[f64; 4]; 2] = [[0.1234, 0.618, 1.7, 3.3], [3.7, 61.7, 1013.0, 86413.0]];
+
+impl Walk<'_> {
+    /// Brakes until the plant is at rest where it can stay for ever.
+    pub(in crate::plan) fn stop(mut self, brake: &Brake) -> Result<Witness, Failure> {
+        let mut u = vec![0.0; self.model.inputs()];
+        let hold = brake.hold.max(self.grid.period);
+        let (mut failure, mut due, mut wait) = (Failure::NoRest, 0, 1);
+        for k in 0..BRAKING {
+            // Followed far ahead is what stands still, and where it did not stay not again at every hold.
+            let rest = match self.is_still(brake, hold, &mut u) && (k >= due || k + 1 == BRAKING) {
+                true => {
+                    (due, wait) = (k + wait, 2 * wait);
+                    self.stays(brake, hold, &u)
+                }
+                false => Ok(false),
+            };
+            let model = self.model;
+            self.hold_under(|x, u| brake.input(&model, x, u), self.t + hold)?;
+            match rest {
+                Ok(true) => return Ok(Witness { until: f64::INFINITY, ..self.witness }),
+                Ok(false) => {}
+                // What still drifts out may do so no longer a hold later.
+                Err(drifts_out) => failure = drifts_out,
+            }
+        }
+        Err(failure)
+    }
+
+    /// Ends where `reference` does, without a rest, if that was still ahead. Its last input is held until then where samples
+    /// lie beside its own.
+    pub(in crate::plan) fn end(mut self, reference: &Reference) -> Result<Witness, Failure> {
+        let (Some(&until), slack) = (reference.times.last(), self.grid.slack()) else {
+            return Err(Failure::NoRest);
+        };
+        if self.started >= until - slack || self.t < until - slack {
+            return Err(Failure::NoRest);
+        }
+        if self.t < until
+            && let Some((_, u)) = self.witness.inputs.pop()
+        {
+            self.hold(&u[..self.model.inputs()], until)?;
+        }
+        Ok(Witness { until, ..self.witness })
+    }
+
+    /// Whether the plant is at rest here, where it can stay for ever, so that a plan may end.
+    pub(in crate::plan) fn may_end(&mut self, brake: &Brake) -> bool {
+        let (mut u, tightest) = (vec![0.0; self.model.inputs()], self.witness.tightest);
+        let hold = brake.hold.max(self.grid.period);
+        let ends = self.is_still(brake, hold, &mut u) && matches!(self.stays(brake, hold, &u), Ok(true));
+        self.witness.tightest = tightest;
+        ends
+    }
+
+    /// Whether the plant that stands still under `u`, the input of `brake`, can stay here for ever. Notes what is tightest there.
+    fn stays(&mut self, brake: &Brake, hold: f64, u: &[f64]) -> Result<bool, Failure> {
+        // Not at the edge of a set, where a margin has to be there later.
+        if !(0..self.requirements.len()).all(|i| self.is_firm(i)) {
+            return Ok(false);
+        }
+        let tightest = self.witness.tightest;
+        let stays = self.rests(u, hold).map(|rests| rests && self.settles(brake, hold));
+        if !matches!(stays, Ok(true)) {
+            self.witness.tightest = tightest;
+        }
+        stays
+    }
+
+    /// Whether the plant stands still here under the input of `brake`, which is written to `u`.
+    fn is_still(&mut self, brake: &Brake, hold: f64, u: &mut [f64]) -> bool {
+        self.point.copy_from_slice(&self.x);
+        self.is_still_at_point(brake, hold, u)
+    }
+
+    /// The same at the state in `point`.
+    fn is_still_at_point(&mut self, brake: &Brake, hold: f64, u: &mut [f64]) -> bool {
+        brake.input(&self.model, &self.point, u);
+        self.model.plant.rate(&self.point, u, &mut self.rate);
+        let small = |i: usize| AT_REST * self.witness.rates[i] + ROUND_OFF * self.point[i].abs() / hold;
+        self.rate.iter().enumerate().all(|(i, rate)| rate.abs() <= small(i))
+    }
+
+    /// Whether a plant at rest here stays in all sets though it may creep on under the braking law.
+    fn settles(&mut self, brake: &Brake, hold: f64) -> bool {
+        let (mut x, mut u) = (self.x.clone(), vec![0.0; self.model.inputs()]);
+        let (requirements, t) = (self.requirements, self.t);
+        let h = |i: usize, x: &[f64]| {
+            let Requirement { model, from, .. } = requirements[i];
+            let begin = t.max(from);
+            let h = model.lowest_from(begin, x).unwrap_or_else(|| model.value(begin, x));
+            if h.is_nan() { f64::NEG_INFINITY } else { h }
+        };
+        let asked = (0..self.requirements.len()).filter(|i| self.requirements[*i].until > self.t);
+        let mut seen: Vec<_> = asked.map(|i| (i, vec![h(i, &x)])).collect();
+        let mut states = vec![x.clone()];
+        for holds in 1..=SETTLING {
+            brake.input(&self.model, &x, &mut u);
+            self.creep(&mut x, &u, hold);
+            states.push(x.clone());
+            for (i, seen) in &mut seen {
+                let h = h(*i, &x);
+                if h < self.least_of(*i) {
+                    return false;
+                }
+                seen.push(h);
+            }
+            let window = holds / 4;
+            if holds % 4 > 0 {
+                continue;
+            }
+            let size = x.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
+            let last = |seen: &dyn Fn(usize) -> f64| [4, 3, 2, 1, 0].map(|back| seen(holds - back * window));
+            // The rest of a plan is asked for half as long, so that time may pass.
+            let windows = |i: usize| {
+                let time = (self.requirements[i].until - self.t).min(LONG * self.strictness);
+                time / (hold * window as f64)
+            };
+            let stays = seen.iter().all(|(i, seen)| {
+                let least = seen.iter().copied().fold(f64::INFINITY, f64::min);
+                let motion = Motion::of(last(&|k| seen[k]), SETTLED * (size + least.abs()));
+                motion.is_some_and(|motion| least - motion.to_come(windows(*i)) >= self.least_of(*i))
+            });
+            if !stays {
+                continue;
+            }
+            // What bends h further on the way of the states has not shown yet, nor what a state does that gathers pace.
+            let ahead = |j: usize| {
+                let motion = Motion::of(last(&|k| states[k][j]), SETTLED * (size + x[j].abs()));
+                motion.map(|motion| (x[j], motion))
+            };
+            let Some(ahead) = (0..x.len()).map(ahead).collect::<Option<Vec<_>>>() else { continue };
+            let longest = seen.iter().map(|(i, _)| windows(*i)).fold(0.0, f64::max);
+            if seen.iter().all(|(i, _)| self.stays_ahead(*i, &ahead, windows(*i)))
+                && self.rests_ahead(brake, hold, &ahead, longest)
+            {
+                let holds = longest * window as f64;
+                return (self.growth(brake, hold, &x) - 1.0) * holds <= GROWS;
+            }
+        }
+        false
+    }
+
+    /// How many times a deviation from the rest at `x` grows over a hold of the braking law: the largest eigenvalue.
+    fn growth(&mut self, brake: &Brake, hold: f64, x: &[f64]) -> f64 {
+        let mut u = vec![0.0; self.model.inputs()];
+        let moved = differences(x, BESIDE, x.len(), |x| {
+            brake.input(&self.model, x, &mut u);
+            self.creep(x, &u, hold);
+        });
+        largest_eigenvalue(&moved)
+    }
+
+    /// Moves `x` on by `duration` s under `u`, of which an integral counts with its mean.
+    pub(in crate::plan) fn run(&mut self, x: &mut [f64], u: &[f64], duration: f64) {
+        let Some(Integral { state, input }) = self.model.integral else { return self.creep(x, u, duration) };
+        let mut held = u.to_vec();
+        let change = core::mem::take(&mut held[input]) * duration;
+        let end = x[state] + change;
+        x[state] += 0.5 * change;
+        self.creep(x, &held, duration);
+        x[state] = end;
+    }
+
+    /// Moves `x` on by `duration` s under `u`, to round-off: by courses of the states, past a kink that breaks them in a step of
+    /// the model.
+    fn creep(&mut self, x: &mut [f64], u: &[f64], duration: f64) {
+        let (plant, mut left) = (self.model.plant, duration);
+        for _ in 0..CREPT {
+            plant.path(x, u, &mut self.path);
+            // However fast something dies away, its course is as short as that.
+            let smooth = self.path.iter().fold(left, |dt, c| course::reach(c, ROUND_OFF * size(c), dt));
+            let mut dt = smooth;
+            let is_followed = loop {
+                self.miss(u, dt);
+                let mut missed = self.rate.iter().zip(&self.path);
+                if missed.all(|(missed, c)| missed * dt <= SETTLED * size(c)) {
+                    break true;
+                }
+                if dt <= KINK * smooth {
+                    break false;
+                }
+                dt *= 0.5;
+            };
+            match is_followed {
+                true => x.iter_mut().zip(&self.path).for_each(|(x, c)| *x = at(c, dt)),
+                false => self.model.flow(x, u, dt),
+            }
+            left -= dt;
+            if left <= 0.0 {
+                return;
+            }
+        }
+        self.model.flow(x, u, left);
+    }
+
+    /// Whether requirement `i` is met as the states move on, for so many windows of time: each from where it is by its motion.
+    /// Of a set that moves, and of a source without enclosures, at instants.
+    fn stays_ahead(&self, i: usize, ahead: &[(f64, Motion)], windows: f64) -> bool {
+        let Requirement { model, from, .. } = self.requirements[i];
+        let begin = self.t.max(from);
+        let is_met = |x: Vec<f64>| {
+            let h = model.lowest_from(begin, &x).unwrap_or_else(|| model.value(begin, &x));
+            h >= self.least_of(i)
+        };
+        match model.is_still(&self.x) {
+            Some(true) => self.encloses(i, ahead, [0.0, windows], WAY_HALVINGS),
+            _ => way(ahead, windows).all(is_met),
+        }
+    }
+
+    /// The same by enclosures of h, from so many windows on until as many.
+    fn encloses(&self, i: usize, ahead: &[(f64, Motion)], [from, to]: [f64; 2], halvings: u32) -> bool {
+        let over = ahead.iter().map(|(x, motion)| {
+            let mut over = [Interval::ALL; COURSE];
+            over[0] = motion.over(*x, [from, to]);
+            over
+        });
+        // A set that does not move where the plant is now may do so farther on: at all times.
+        let h = self.requirements[i].model.value_over(Interval::ALL, &over.collect::<Vec<_>>());
+        // Not-a-number is not large enough.
+        if h.is_some_and(|h| h.low >= self.least_of(i)) {
+            return true;
+        }
+        let middle = 0.5 * (from + to);
+        let parts = [[from, middle], [middle, to]];
+        halvings > 0 && parts.into_iter().all(|part| self.encloses(i, ahead, part, halvings - 1))
+    }
+
+    /// Whether the plant still rests under the input of `brake` as the states move on: a force that grows on their way has not
+    /// shown yet.
+    fn rests_ahead(&mut self, brake: &Brake, hold: f64, ahead: &[(f64, Motion)], windows: f64) -> bool {
+        let mut u = vec![0.0; self.model.inputs()];
+        way(ahead, windows).all(|x| {
+            self.point.copy_from_slice(&x);
+            self.is_still_at_point(brake, hold, &mut u)
+        })
+    }
+
+    /// Whether a plant at rest here stays in all sets that are or will be asked for: they are still, or it is known how near
+    /// they come.
+    fn rests(&mut self, u: &[f64], hold: f64) -> Result<bool, Failure> {
+        let length = (self.t - self.started).max(self.grid.period);
+        self.model.plant.path(&self.x, u, &mut self.path);
+        for i in 0..self.requirements.len() {
+            let requirement = &self.requirements[i];
+            if requirement.until <= self.t {
+                continue;
+            }
+            let h = requirement.model.value(self.t, &self.x);
+            let mut spans = LATER[0].iter().map(|part| part * length).chain(LATER[1]);
+            let moves = spans.any(|span| {
+                let later = requirement.model.value(self.t + span, &self.x);
+                (later - h).abs() > 1e-12 * (1.0 + h.abs())
+            });
+            if moves || requirement.model.is_still(&self.x) == Some(false) {
+                let begin = self.t.max(requirement.from);
+                for (x, c) in self.point.iter_mut().zip(&self.path) {
+                    *x = c[0] + c[1] * DRIFT * hold;
+                }
+                let lowest = |x: &[f64]| requirement.model.lowest_from(begin, x);
+                let (Some(here), Some(there)) = (lowest(&self.x), lowest(&self.point)) else {
+                    return Ok(false);
+                };
+                self.note(i, begin, here.min(there))?;
+                continue;
+            }
+            let mut course = [0.0; COURSE];
+            requirement.model.value_along(self.t, &self.path, &mut course);
+            let drift = course[1].abs() * (DRIFT * hold).min(requirement.until - self.t);
+            self.note(i, self.t.max(requirement.from), h - drift)?;
+        }
+        Ok(true)
+    }
+}
