@@ -45,7 +45,7 @@ pub fn ruled_out(
 ///
 /// ```
 /// use punctual_core::barriers::HalfPlane;
-/// use punctual_reference::plants::PointMass;
+/// use punctual_core::plants::PointMass;
 /// use punctual_core::{lie, qp::Bounds, reach};
 ///
 /// // 9 m from rest with 2 m/s²: 3 s.

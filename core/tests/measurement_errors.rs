@@ -8,7 +8,7 @@ use punctual_core::filter::{
     BarrierSettings, FilterBuilder, Method, SafetyFilter, SampleDerivative, Sampling,
 };
 use punctual_core::lie;
-use punctual_reference::plants::{PointMass, Unicycle};
+use punctual_core::plants::{PointMass, Unicycle};
 use support::distance_disc;
 
 const PERIOD: f64 = 0.01;

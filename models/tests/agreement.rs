@@ -7,10 +7,9 @@ use punctual_core::barrier::Barrier;
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::{ControlAffine, DynPlant, Erased};
 use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives, Direction, RelativeDegree};
-use punctual_core::nalgebra::{SMatrix, SVector};
+use punctual_core::plants::{Bicycle, KinematicBicycle, PointMass, SmallSlipBicycle, Unicycle};
 use punctual_core::scalar::Scalar;
 use punctual_models::Model;
-use punctual_reference::plants::{Bicycle, KinematicBicycle, PointMass, SmallSlipBicycle, Unicycle};
 
 /// A random expression: text for the one side, a tree for the other.
 #[derive(Clone, Debug)]
@@ -39,7 +38,7 @@ impl Tree {
         }
     }
 
-    fn value<S: Scalar>(&self, t: S, x: &SVector<S, 2>) -> S {
+    fn value<S: Scalar>(&self, t: S, x: &[S; 2]) -> S {
         match self {
             Self::State(i) => x[*i],
             Self::Time => t,
@@ -103,17 +102,17 @@ fn tree(time: bool) -> impl Strategy<Value = Tree> {
 struct Random([Tree; 3]);
 
 impl ControlAffine<2, 2> for Random {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-        SVector::from([self.0[0].value(S::zero(), x), self.0[1].value(S::zero(), x)])
+    fn drift<S: Scalar>(&self, x: &[S; 2]) -> [S; 2] {
+        [self.0[0].value(S::zero(), x), self.0[1].value(S::zero(), x)]
     }
 
-    fn input_map<S: Scalar>(&self, x: &SVector<S, 2>) -> SMatrix<S, 2, 2> {
-        SMatrix::from([[S::one(), self.0[2].value(S::zero(), x)], [S::zero(), S::one()]])
+    fn input_map<S: Scalar>(&self, x: &[S; 2]) -> [[S; 2]; 2] {
+        [[S::one(), S::zero()], [self.0[2].value(S::zero(), x), S::one()]]
     }
 }
 
 impl Barrier<2> for Tree {
-    fn value<S: Scalar>(&self, t: S, x: &SVector<S, 2>) -> S {
+    fn value<S: Scalar>(&self, t: S, x: &[S; 2]) -> S {
         Self::value(self, t, x)
     }
 }

@@ -6,8 +6,8 @@ use punctual_core::dynamics::{DynPlant, Erased};
 use punctual_core::filter::{
     BarrierSettings, FilterBuilder, IntegratedFilter, Integration, SafetyFilter, Sampling,
 };
+use punctual_core::plants::{Bicycle, KinematicBicycle, SmallSlipBicycle, Steering};
 use punctual_fmu::FilterLoop;
-use punctual_reference::plants::{Bicycle, KinematicBicycle, SmallSlipBicycle, Steering};
 use rayon::prelude::*;
 
 use super::cases::{CENTRE, RADIUS, SMOOTHING, Setup};

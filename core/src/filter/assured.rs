@@ -312,7 +312,7 @@ impl From<f64> for Pace {
 ///
 /// ```
 /// # use punctual_core::{barriers::DistanceDisc, filter::*};
-/// # use punctual_reference::plants::Unicycle;
+/// # use punctual_core::plants::Unicycle;
 /// let goal = DistanceDisc::new([20.0, 10.0], 2.0, 1.0)?;
 /// let filter = SafetyFilter::builder(4, 2)
 ///     .barrier("goal", Unicycle, goal, BarrierSettings::within(8.0))?

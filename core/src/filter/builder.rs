@@ -5,8 +5,6 @@ use alloc::boxed::Box;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use nalgebra::SVector;
-
 use super::errors::{self, MeasurementErrors};
 use super::search::Scratch;
 use super::shared::SharedPlants;
@@ -69,7 +67,7 @@ impl FilterBuilder {
     ///
     /// ```
     /// # use punctual_core::{barriers::DistanceDisc, filter::*};
-    /// # use punctual_reference::plants::SmallSlipBicycle;
+    /// # use punctual_core::plants::SmallSlipBicycle;
     /// let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
     /// let refused = SafetyFilter::builder(4, 2)
     ///     .barrier("goal", SmallSlipBicycle::new(10.0)?, goal, BarrierSettings::within(10.0))
@@ -114,7 +112,7 @@ impl FilterBuilder {
         name: &str,
         plant: P,
         barrier: B,
-        (n, samples): (usize, &[SVector<f64, NX>]),
+        (n, samples): (usize, &[[f64; NX]]),
         settings: BarrierSettings,
     ) -> Result<Self, Error>
     where
@@ -153,7 +151,7 @@ impl FilterBuilder {
     ///
     /// ```
     /// # use punctual_core::{barriers::DistanceDisc, convergence::profile::Hermite, filter::*};
-    /// # use punctual_reference::plants::PointMass;
+    /// # use punctual_core::plants::PointMass;
     /// use punctual_core::convergence::profile::Profile;
     ///
     /// // Arrive in nine tenths of the time.
@@ -182,7 +180,7 @@ impl FilterBuilder {
     ///
     /// ```
     /// # use punctual_core::{barriers::DistanceDisc, filter::*};
-    /// # use punctual_reference::plants::PointMass;
+    /// # use punctual_core::plants::PointMass;
     /// use punctual_reference::baselines::Exponential;
     ///
     /// let filter = SafetyFilter::builder(4, 2)
@@ -204,7 +202,7 @@ impl FilterBuilder {
     ///
     /// ```
     /// # use punctual_core::{barriers::DistanceDisc, filter::*};
-    /// # use punctual_reference::plants::PointMass;
+    /// # use punctual_core::plants::PointMass;
     /// // In A by 5 s, then in B by 10 s.
     /// let disc = |x| DistanceDisc::new([x, 0.0], 2.0, 2.0);
     /// let filter = SafetyFilter::builder(4, 2)

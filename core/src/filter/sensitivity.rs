@@ -183,7 +183,7 @@ impl SafetyFilter {
     ///
     /// ```
     /// # use punctual_core::{barriers::DistanceDisc, filter::*, lie::Direction};
-    /// # use punctual_reference::plants::PointMass;
+    /// # use punctual_core::plants::PointMass;
     /// let mut filter = SafetyFilter::builder(4, 2)
     ///     .barrier("goal", PointMass, DistanceDisc::new([45.0, 0.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
     ///     .build()?;
