@@ -12,6 +12,7 @@
 //! | `law` | feedback that stops the plant, and feedback that follows a reference |
 //! | `check` | the exact check: a roll-out that meets every requirement, between its nodes too |
 //! | `course` | polynomials in time, and what they do not fall below |
+//! | `failure` | why there is no plan, in words |
 //! | `integral` | the mean of an integral over each period, and its limits |
 //! | `search` | reference trajectories by sequential convex programming |
 //! | `planner` | which trials are made, in which order, and what is kept between samples |
@@ -20,6 +21,7 @@
 
 mod check;
 mod course;
+mod failure;
 mod integral;
 mod law;
 mod model;
@@ -27,7 +29,8 @@ mod planner;
 mod search;
 
 pub(crate) use check::ON_TIME;
-pub use check::{Failure, Tightest, Witness};
+pub use check::{Tightest, Witness};
+pub use failure::{Failure, Names};
 pub use integral::Integral;
 pub(crate) use integral::Limit;
 pub(crate) use model::slopes;
