@@ -108,6 +108,14 @@ pub mod scalar;
 
 pub use error::{Error, ErrorKind};
 
+/// What the crate `punctual-models` shares with this one. No part of the interface: it changes without notice.
+#[doc(hidden)]
+pub mod internal {
+    pub use crate::lie::ahead::{SUBSTEPS, is_even};
+    pub use crate::lie::degree::{Coefficients, relative_degree_of, samples};
+    pub use crate::lie::enclosure::{enclose, sharper};
+}
+
 /// Largest relative degree n supported: the order of the highest derivative of h that is taken.
 pub const MAX_RELATIVE_DEGREE: usize = 8;
 

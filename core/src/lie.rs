@@ -16,14 +16,15 @@
 //! (for a time-varying h, L_f stands for ∂/∂t + L_f). All are exact up to round-off. The filter checks (3) at every
 //! evaluation, since an input that enters earlier invalidates every constraint built for n.
 
-mod ahead;
-mod degree;
+pub(crate) mod ahead;
+pub(crate) mod degree;
 mod embedded;
-mod enclosure;
+pub(crate) mod enclosure;
 mod external;
 mod source;
 
-pub use ahead::{Ahead, SUBSTEPS, flow, is_even};
+use ahead::SUBSTEPS;
+pub use ahead::{Ahead, flow};
 
 use alloc::boxed::Box;
 use core::any::Any;
@@ -39,8 +40,7 @@ use crate::scalar::all_finite;
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
 pub use crate::error::RelativeDegree;
-pub use degree::{Coefficients, detected, relative_degree, relative_degree_of, samples};
-pub use enclosure::{enclose, sharper};
+pub use degree::{detected, relative_degree};
 pub use embedded::embedded;
 pub use external::external;
 pub(crate) use source::FEW_ORDERS;
@@ -52,7 +52,7 @@ pub use source::{
 /// The Taylor series of h(t, x(t)) at `t` and `x` with u = 0, `K` coefficients, each with its
 /// derivatives along the `NU` inputs. This is (1)–(3) before multiplication by k!.
 #[inline]
-pub fn barrier_series<P, B, const NX: usize, const NU: usize, const K: usize>(
+pub(crate) fn barrier_series<P, B, const NX: usize, const NU: usize, const K: usize>(
     plant: &P,
     barrier: &B,
     t: f64,

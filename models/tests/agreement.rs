@@ -6,6 +6,7 @@ use proptest::prelude::*;
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::{ControlAffine, DynPlant, Erased};
+use punctual_core::internal;
 use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives, Direction, RelativeDegree};
 use punctual_core::plants::{Bicycle, KinematicBicycle, PointMass, SmallSlipBicycle, Unicycle};
 use punctual_core::scalar::Scalar;
@@ -202,7 +203,7 @@ where
     let found = barrier.source(2).expect("in range");
     let wanted = lie::along(plant, disc(), 2).expect("in range");
     let simulated: Box<dyn DynPlant> = Box::new(Erased(plant));
-    for (_, x) in lie::samples(&[[-3.0, 3.0]; NX]).into_iter().cycle().take(50) {
+    for (_, x) in internal::samples(&[[-3.0, 3.0]; NX]).into_iter().cycle().take(50) {
         let pairs = both(&*found, &*wanted, &x, &[0.7, -0.2]);
         let size = pairs.iter().map(|p| p[1].abs()).fold(1.0, f64::max);
         for (i, [found, wanted]) in pairs.into_iter().enumerate() {
@@ -303,7 +304,7 @@ fn barriers_along_one_model_share_the_plant() {
     let [one, shared, longer] = [&one, &other, &longer].map(|s| s.shared().expect("a source that shares"));
     assert!(one.shares(shared.plant()) && shared.shares(one.plant()) && !one.shares(longer.plant()));
     let [mut motion, mut ahead] = one.rooms();
-    for (t, x) in lie::samples(&[[-3.0, 3.0]; 4]).into_iter().take(50) {
+    for (t, x) in internal::samples(&[[-3.0, 3.0]; 4]).into_iter().take(50) {
         let (mut found, mut wanted) = (Derivatives::ZERO, Derivatives::ZERO);
         one.motion(&x, &mut *motion);
         shared.evaluate_along(t, &*motion, &mut found);
