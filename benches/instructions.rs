@@ -7,9 +7,9 @@ use punctual::coupling::{InProcess, Own, Simulation, System, alone};
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{FilterBuilder, Sampling};
 use punctual_core::lie::{self, DerivativeSource, Derivatives};
+use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 use punctual_core::qp::{Bounds, Outcome, Problem, Row, Workspace};
 use punctual_fmu::configuration::{Configuration, FilterConfiguration};
-use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
 use support::{
     ByHand, Drive, Integrators, SAFE, T, X, anchored, disc, goal, goal_and_obstacles, obstructed, promise,
 };

@@ -11,7 +11,7 @@ use std::time::Instant;
 
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{Filter, FilterBuilder, Sampling, Status};
-use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
+use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 use support::sources::{MODELS, derivatives, expressed, given, on_the_way, plugged};
 use support::{T, X, anchored, goal};
 

@@ -12,7 +12,7 @@ use std::hint::black_box;
 use criterion::{Criterion, criterion_group, criterion_main};
 use punctual_core::filter::{BarrierSettings, FilterBuilder, Sampling, Status};
 use punctual_core::lie::{self, Derivatives};
-use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
+use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 use support::{ByHand, Integrators, SAFE, T, X, anchored, disc, goal, goal_and_obstacles, promise};
 
 mod support;

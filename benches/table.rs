@@ -12,7 +12,7 @@ use std::time::Instant;
 
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{Driver, FilterBuilder, Sampling, Standing};
-use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
+use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 use support::{ByHand, Drive, T, X, obstructed};
 
 mod support;
@@ -68,7 +68,7 @@ where
                 return None;
             }
             by_plan[k] = assurance.driver == Driver::Plan;
-            x = rk4_step(plant, &x.into(), &u.into(), PERIOD).into();
+            x = rk4_step(plant, &x, &u, PERIOD);
         }
     }
     let those = |plan: bool| {

@@ -11,7 +11,7 @@
 use std::time::Instant;
 
 use punctual_core::filter::{FilterBuilder, Sampling};
-use punctual_reference::plants::{PointMass, Unicycle};
+use punctual_core::plants::{PointMass, Unicycle};
 use support::{goal, goal_and_obstacles};
 
 mod support;

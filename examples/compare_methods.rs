@@ -8,8 +8,7 @@
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
 use punctual_core::filter::{BarrierSettings, Filter, Method, Sampling};
-use punctual_core::nalgebra::{self, Vector2, Vector4, vector};
-use punctual_reference::plants::Unicycle;
+use punctual_core::plants::Unicycle;
 use punctual_reference::simulation::{Schedule, closed_loop};
 
 const CENTRE: [f64; 2] = [45.0, 45.0]; // m
@@ -24,7 +23,7 @@ struct Run {
     /// Largest distance from the disc from the deadline on, in m; 0 inside.
     outside: f64,
     /// Largest acceleration (m/s²) and turning rate (rad/s) before arrival.
-    peak: Vector2<f64>,
+    peak: [f64; 2],
 }
 
 /// Runs the unicycle from rest in the origin.
@@ -32,23 +31,23 @@ fn run(
     barrier: impl Barrier<4> + Send + 'static,
     settings: BarrierSettings,
     sampling: Sampling,
-    nominal: fn(&Vector4<f64>) -> Vector2<f64>,
+    nominal: fn(&[f64; 4]) -> [f64; 2],
 ) -> Result<Run, punctual_core::Error> {
     let mut filter =
         Filter::builder(4, 2).barrier("goal", Unicycle, barrier, settings)?.sampling(sampling)?.build()?;
     let schedule = Schedule { step: STEP, steps: (2.0 * DEADLINE / STEP).round() as usize, substeps: 1 };
-    let mut run = Run { arrival: f64::INFINITY, outside: 0.0, peak: Vector2::zeros() };
+    let mut run = Run { arrival: f64::INFINITY, outside: 0.0, peak: [0.0; 2] };
     closed_loop(
         &mut filter,
         &Unicycle,
-        Vector4::zeros(),
+        [0.0; 4],
         schedule,
         |_, x| nominal(x),
         |t, x, u, report| {
             if let Some(arrival) = report.barriers[0].arrival_time {
                 run.arrival = arrival;
             } else {
-                run.peak = run.peak.sup(&u.abs());
+                run.peak = [0, 1].map(|i| run.peak[i].max(u[i].abs()));
             }
             if t >= DEADLINE {
                 let distance = (x[0] - CENTRE[0]).hypot(x[1] - CENTRE[1]);
@@ -61,13 +60,12 @@ fn run(
 
 fn main() -> Result<(), punctual_core::Error> {
     let root = BarrierSettings { method: Method::RepeatedRoot, ..BarrierSettings::within(DEADLINE) };
-    let paper = run(QuadraticDisc::new(CENTRE, RADIUS)?, root, Sampling::Pointwise, |_| Vector2::zeros())?;
+    let paper = run(QuadraticDisc::new(CENTRE, RADIUS)?, root, Sampling::Pointwise, |_| [0.0; 2])?;
 
     // Damping keeps the arrival gentle; the constraint is enforced over the sampling period, the default.
     let profile = BarrierSettings { margin: 0.02, ..BarrierSettings::within(DEADLINE) };
-    let ours = run(DistanceDisc::new(CENTRE, RADIUS, RADIUS)?, profile, Sampling::default(), |x| {
-        vector![-x[3], 0.0]
-    })?;
+    let ours =
+        run(DistanceDisc::new(CENTRE, RADIUS, RADIUS)?, profile, Sampling::default(), |x| [-x[3], 0.0])?;
 
     println!("method              arrival  outside after deadline  peak acceleration  peak turning rate");
     for (name, run) in [("repeated root", &paper), ("reference profile", &ours)] {

@@ -9,7 +9,6 @@ use punctual_core::barrier::Barrier;
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{BarrierSettings, Filter};
 use punctual_core::lie;
-use punctual_core::nalgebra::{self, SMatrix, SVector, Vector4, matrix, vector};
 use punctual_core::scalar::Scalar;
 use punctual_reference::simulation::{Schedule, closed_loop};
 
@@ -26,13 +25,13 @@ struct Arm {
 const ARM: Arm = Arm { gravity: 10.0, stiffness: 100.0, motor_side: 100.0, motor_inverse: 10.0 };
 
 impl ControlAffine<4, 1> for Arm {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
+    fn drift<S: Scalar>(&self, x: &[S; 4]) -> [S; 4] {
         let twist = x[0] - x[2];
-        vector![x[1], -x[0].sin() * self.gravity - twist * self.stiffness, x[3], twist * self.motor_side]
+        [x[1], -x[0].sin() * self.gravity - twist * self.stiffness, x[3], twist * self.motor_side]
     }
 
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 4>) -> SMatrix<S, 4, 1> {
-        matrix![S::zero(); S::zero(); S::zero(); S::from(self.motor_inverse)]
+    fn input_map<S: Scalar>(&self, _x: &[S; 4]) -> [[S; 1]; 4] {
+        [[S::zero()], [S::zero()], [S::zero()], [S::from(self.motor_inverse)]]
     }
 }
 
@@ -44,7 +43,7 @@ struct Window {
 }
 
 impl Barrier<4> for Window {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 4>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; 4]) -> S {
         -((x[0] - self.target).squared() + self.width * self.width).sqrt() + self.width.hypot(self.width)
     }
 }
@@ -63,10 +62,10 @@ fn main() -> Result<(), punctual_core::Error> {
     // 6 s in steps of 1 ms, hanging at rest. The wanted input damps the motor and does nothing else, so that
     // gravity pulls the arm down all the time.
     let schedule = Schedule { step: 0.001, steps: 6000, substeps: 1 };
-    let damping = |_: f64, x: &Vector4<f64>| vector![-2.0 * x[3]];
+    let damping = |_: f64, x: &[f64; 4]| [-2.0 * x[3]];
     let (mut arrival, mut outside, mut peak, mut rows) = (None, 0.0_f64, 0.0_f64, 0);
     println!("    t       arm     motor    torque         h");
-    closed_loop(&mut filter, &ARM, Vector4::zeros(), schedule, damping, |t, x, u, report| {
+    closed_loop(&mut filter, &ARM, [0.0; 4], schedule, damping, |t, x, u, report| {
         let b = &report.barriers[0];
         if rows % 500 == 0 {
             println!("{t:5.1} {:9.3} {:9.3} {:9.3} {:9.3}", x[0], x[2], u[0], b.h);

@@ -8,7 +8,6 @@
 use punctual_core::barrier::Barrier;
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{BarrierSettings, Filter};
-use punctual_core::nalgebra::{self, SMatrix, SVector, matrix, vector};
 use punctual_core::scalar::Scalar;
 use punctual_reference::simulation::{Schedule, closed_loop};
 
@@ -17,12 +16,12 @@ use punctual_reference::simulation::{Schedule, closed_loop};
 struct Lift;
 
 impl ControlAffine<3, 1> for Lift {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
-        vector![x[1], x[2], S::zero()]
+    fn drift<S: Scalar>(&self, x: &[S; 3]) -> [S; 3] {
+        [x[1], x[2], S::zero()]
     }
 
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 3>) -> SMatrix<S, 3, 1> {
-        matrix![S::zero(); S::zero(); S::one()]
+    fn input_map<S: Scalar>(&self, _x: &[S; 3]) -> [[S; 1]; 3] {
+        [[S::zero()], [S::zero()], [S::one()]]
     }
 }
 
@@ -32,7 +31,7 @@ struct Above {
 }
 
 impl Barrier<3> for Above {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 3>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; 3]) -> S {
         x[0] - self.level
     }
 }
@@ -46,10 +45,10 @@ fn main() -> Result<(), punctual_core::Error> {
 
     // 20 s in steps of 1 ms, from rest at 0. The wanted motion is down at 1 m/s.
     let schedule = Schedule { step: 0.001, steps: 20_000, substeps: 1 };
-    let down = |_: f64, x: &SVector<f64, 3>| vector![-4.0 * (x[1] + 1.0) - 4.0 * x[2]];
+    let down = |_: f64, x: &[f64; 3]| [-4.0 * (x[1] + 1.0) - 4.0 * x[2]];
     let (mut arrival, mut least_after, mut peak, mut rows) = (None, f64::INFINITY, 0.0_f64, 0);
     println!("    t    height     speed     accel.      jerk         h");
-    closed_loop(&mut filter, &Lift, SVector::zeros(), schedule, down, |t, x, u, report| {
+    closed_loop(&mut filter, &Lift, [0.0; 3], schedule, down, |t, x, u, report| {
         let b = &report.barriers[0];
         if rows % 1000 == 0 {
             println!("{t:5.1} {:9.3} {:9.3} {:9.3} {:9.3} {:9.3}", x[0], x[1], x[2], u[0], b.h);

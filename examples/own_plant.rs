@@ -7,7 +7,6 @@
 use punctual_core::barrier::Barrier;
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{BarrierSettings, Filter};
-use punctual_core::nalgebra::{self, SMatrix, SVector, matrix, vector};
 use punctual_core::scalar::Scalar;
 use punctual_reference::simulation::{Schedule, closed_loop};
 
@@ -17,14 +16,14 @@ struct Cart {
 }
 
 impl ControlAffine<2, 1> for Cart {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+    fn drift<S: Scalar>(&self, x: &[S; 2]) -> [S; 2] {
         // |v| made smooth, since derivatives are taken through it.
         let speed = (x[1].squared() + 0.01).sqrt();
-        vector![x[1], -x[1] * speed * self.drag]
+        [x[1], -x[1] * speed * self.drag]
     }
 
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
-        matrix![S::zero(); S::one()]
+    fn input_map<S: Scalar>(&self, _x: &[S; 2]) -> [[S; 1]; 2] {
+        [[S::zero()], [S::one()]]
     }
 }
 
@@ -34,7 +33,7 @@ struct Beyond {
 }
 
 impl Barrier<2> for Beyond {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 2>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; 2]) -> S {
         x[0] - self.line
     }
 }
@@ -48,10 +47,10 @@ fn main() -> Result<(), punctual_core::Error> {
 
     // 10 s in steps of 10 ms from rest at 0; the driver wants to go at -1 m/s.
     let schedule = Schedule { step: 0.01, steps: 1000, substeps: 1 };
-    let driver = |_t: f64, x: &SVector<f64, 2>| vector![-1.0 - x[1]];
+    let driver = |_t: f64, x: &[f64; 2]| [-1.0 - x[1]];
     let (mut arrival, mut least_after, mut rows) = (None, f64::INFINITY, 0);
     println!("    t  position     speed    wanted      safe         h");
-    closed_loop(&mut filter, &cart(), vector![0.0, 0.0], schedule, driver, |t, x, u, report| {
+    closed_loop(&mut filter, &cart(), [0.0, 0.0], schedule, driver, |t, x, u, report| {
         let line = &report.barriers[0];
         if rows % 100 == 0 {
             println!("{t:5.1} {:9.3} {:9.3} {:9.3} {:9.3} {:9.3}", x[0], x[1], driver(t, x)[0], u[0], line.h);

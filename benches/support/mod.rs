@@ -4,13 +4,14 @@
 
 pub(crate) mod sources;
 
+use std::array::from_fn;
+
 use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::convergence::{FixedTime, FixedTimeSettings, FixedTimeState};
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, FilterState, Sampling};
-use punctual_core::nalgebra::{SMatrix, SVector};
+use punctual_core::plants::PointMass;
 use punctual_core::scalar::Scalar;
-use punctual_reference::plants::PointMass;
 
 /// A time and state at which the row is active after anchoring at the origin at time 0.
 pub(crate) const T: f64 = 4.0;
@@ -93,7 +94,7 @@ impl Drive {
                 samples.push((t, x));
             }
             filter.step(t, &x, &[0.0; 2], &mut u).expect("right dimensions");
-            x = rk4_step(plant, &x.into(), &u.into(), period).into();
+            x = rk4_step(plant, &x, &u, period);
         }
         filter.restore(&begin).expect("its own state");
         Self { filter, begin, samples, next: 0 }
@@ -130,19 +131,19 @@ pub(crate) struct Integrators<const NX: usize>;
 impl<const NX: usize> Integrators<NX> {
     /// A state on the way to the disc.
     pub(crate) fn state() -> [f64; NX] {
-        std::array::from_fn(|i| if i < 4 { X[i] } else { 0.3 - 0.05 * i as f64 })
+        from_fn(|i| if i < 4 { X[i] } else { 0.3 - 0.05 * i as f64 })
     }
 }
 
 impl<const NX: usize> ControlAffine<NX, 2> for Integrators<NX> {
     #[inline]
-    fn drift<S: Scalar>(&self, x: &SVector<S, NX>) -> SVector<S, NX> {
-        SVector::from_fn(|i, _| if i + 2 < NX { x[i + 2] } else { S::zero() })
+    fn drift<S: Scalar>(&self, x: &[S; NX]) -> [S; NX] {
+        from_fn(|i| if i + 2 < NX { x[i + 2] } else { S::zero() })
     }
 
     #[inline]
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, NX>) -> SMatrix<S, NX, 2> {
-        SMatrix::from_fn(|i, j| if i + 2 == NX + j { S::one() } else { S::zero() })
+    fn input_map<S: Scalar>(&self, _x: &[S; NX]) -> [[S; 2]; NX] {
+        from_fn(|i| from_fn(|j| if i + 2 == NX + j { S::one() } else { S::zero() }))
     }
 }
 

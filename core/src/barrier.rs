@@ -1,23 +1,19 @@
 //! Barriers: the function h whose non-negative set is the safe set.
 
-use nalgebra::SVector;
-
 use crate::dynamics::Region;
 use crate::scalar::Scalar;
 
 /// A barrier `h(t, x)`; the safe set is `C(t) = {x : h(t, x) ≥ 0}`.
 ///
 /// ```
-/// use nalgebra::SVector;
 /// use punctual_core::barrier::Barrier;
-/// use punctual_core::nalgebra;
 /// use punctual_core::scalar::Scalar;
 ///
 /// /// Speed limit: h = v_max − v for a state (position, velocity).
 /// struct SpeedLimit(f64);
 ///
 /// impl Barrier<2> for SpeedLimit {
-///     fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 2>) -> S {
+///     fn value<S: Scalar>(&self, _t: S, x: &[S; 2]) -> S {
 ///         -x[1] + self.0
 ///     }
 /// }
@@ -36,7 +32,7 @@ pub trait Barrier<const NX: usize> {
     const BENDS_ONE_WAY: bool = false;
 
     /// h at time `t` (in seconds, on the filter's time axis) and state `x`.
-    fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S;
+    fn value<S: Scalar>(&self, t: S, x: &[S; NX]) -> S;
 
     /// A number that h does not exceed while the time is between `time[0]` and `time[1]` and the position, the
     /// first two states, is in `region`, whatever the other states are. `None`, the default, where that is
@@ -47,7 +43,7 @@ pub trait Barrier<const NX: usize> {
 
     /// The least and the largest value of h from `t` (s) on while the state stays `x`, infinite where there is none. `None`,
     /// the default, where they are not known: then a set that moves is not [assured](crate::filter::Filter).
-    fn range_from(&self, _t: f64, _x: &SVector<f64, NX>) -> Option<[f64; 2]> {
+    fn range_from(&self, _t: f64, _x: &[f64; NX]) -> Option<[f64; 2]> {
         None
     }
 }

@@ -1,6 +1,6 @@
 //! Control-affine dynamics `ẋ = f(x) + g(x) u`, written once and generic over the scalar.
 
-use nalgebra::{SMatrix, SVector};
+use core::array::from_fn;
 
 use crate::elementary;
 use crate::error::{Error, length};
@@ -9,9 +9,7 @@ use crate::scalar::Scalar;
 /// A plant `ẋ = f(x) + g(x) u` with `NX` states and `NU` inputs.
 ///
 /// ```
-/// use nalgebra::{SMatrix, SVector, matrix, vector};
 /// use punctual_core::dynamics::ControlAffine;
-/// use punctual_core::nalgebra;
 /// use punctual_core::scalar::Scalar;
 ///
 /// /// A cart with quadratic drag: x = (position in m, velocity in m/s), u = acceleration in m/s².
@@ -20,11 +18,11 @@ use crate::scalar::Scalar;
 /// }
 ///
 /// impl ControlAffine<2, 1> for Cart {
-///     fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-///         vector![x[1], -x[1].squared() * self.drag]
+///     fn drift<S: Scalar>(&self, x: &[S; 2]) -> [S; 2] {
+///         [x[1], -x[1].squared() * self.drag]
 ///     }
-///     fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
-///         matrix![S::zero(); S::one()]
+///     fn input_map<S: Scalar>(&self, _x: &[S; 2]) -> [[S; 1]; 2] {
+///         [[S::zero()], [S::one()]]
 ///     }
 /// }
 /// ```
@@ -53,21 +51,21 @@ pub trait ControlAffine<const NX: usize, const NU: usize> {
     }
 
     /// f(x): the rate of change of the state at u = 0, per second.
-    fn drift<S: Scalar>(&self, x: &SVector<S, NX>) -> SVector<S, NX>;
+    fn drift<S: Scalar>(&self, x: &[S; NX]) -> [S; NX];
 
     /// g(x): how each input changes the rate of the state.
-    fn input_map<S: Scalar>(&self, x: &SVector<S, NX>) -> SMatrix<S, NX, NU>;
+    fn input_map<S: Scalar>(&self, x: &[S; NX]) -> [[S; NU]; NX];
 
     /// f(x) + g(x) u.
     #[inline]
-    fn derivative<S: Scalar>(&self, x: &SVector<S, NX>, u: &SVector<S, NU>) -> SVector<S, NX> {
+    fn derivative<S: Scalar>(&self, x: &[S; NX], u: &[S; NU]) -> [S; NX] {
         let mut dx = self.drift(x);
         let g = self.input_map(x);
         for j in 0..NU {
             for i in 0..NX {
                 // Known to the compiler where it is a constant.
-                if !g[(i, j)].is_zero() {
-                    dx[i] += g[(i, j)] * u[j];
+                if !g[i][j].is_zero() {
+                    dx[i] += g[i][j] * u[j];
                 }
             }
         }
@@ -77,7 +75,7 @@ pub trait ControlAffine<const NX: usize, const NU: usize> {
     /// A region that contains every position, the first two states, between `time[0]` and `time[1]` s (0 ≤ first ≤
     /// second) after the state `x`, under any input with `bounds[0]` ≤ u ≤ `bounds[1]` (`NU` components). `None`,
     /// the default, where none is known.
-    fn region(&self, _x: &SVector<f64, NX>, _bounds: [&[f64]; 2], _time: [f64; 2]) -> Option<Region> {
+    fn region(&self, _x: &[f64; NX], _bounds: [&[f64]; 2], _time: [f64; 2]) -> Option<Region> {
         None
     }
 }
@@ -158,7 +156,7 @@ pub fn chain(from: &[f64], input: [f64; 2], time: [f64; 2]) -> [f64; 2] {
 /// use punctual_core::barriers::DistanceDisc;
 /// use punctual_core::dynamics::IntegratedInput;
 /// use punctual_core::lie::{RelativeDegree, detected};
-/// use punctual_reference::plants::SmallSlipBicycle;
+/// use punctual_core::plants::SmallSlipBicycle;
 ///
 /// let disc = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
 /// let bicycle = SmallSlipBicycle::new(10.0)?;
@@ -192,26 +190,28 @@ where
     }
 
     #[inline]
-    fn drift<S: Scalar>(&self, x: &SVector<S, EXTENDED>) -> SVector<S, EXTENDED> {
+    fn drift<S: Scalar>(&self, x: &[S; EXTENDED]) -> [S; EXTENDED] {
         const { assert!(EXTENDED == NX + 1, "one state more than the plant inside") };
-        let inner = SVector::<S, NX>::from_fn(|i, _| x[i]);
+        let inner = from_fn::<S, NX, _>(|i| x[i]);
         let (f, g) = (self.plant.drift(&inner), self.plant.input_map(&inner));
-        let held = |i: usize| if self.input < NU { g[(i, self.input)] * x[NX] } else { S::zero() };
-        SVector::from_fn(|i, _| if i < NX { f[i] + held(i) } else { S::zero() })
+        let held = |i: usize| if self.input < NU { g[i][self.input] * x[NX] } else { S::zero() };
+        from_fn(|i| if i < NX { f[i] + held(i) } else { S::zero() })
     }
 
     #[inline]
-    fn input_map<S: Scalar>(&self, x: &SVector<S, EXTENDED>) -> SMatrix<S, EXTENDED, NU> {
-        let g = self.plant.input_map(&SVector::<S, NX>::from_fn(|i, _| x[i]));
-        SMatrix::from_fn(|i, j| match (i < NX, j == self.input) {
-            (true, false) => g[(i, j)],
-            (false, true) => S::one(),
-            _ => S::zero(),
+    fn input_map<S: Scalar>(&self, x: &[S; EXTENDED]) -> [[S; NU]; EXTENDED] {
+        let g = self.plant.input_map(&from_fn::<S, NX, _>(|i| x[i]));
+        from_fn(|i| {
+            from_fn(|j| match (i < NX, j == self.input) {
+                (true, false) => g[i][j],
+                (false, true) => S::one(),
+                _ => S::zero(),
+            })
         })
     }
 
-    fn region(&self, x: &SVector<f64, EXTENDED>, bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
-        let inner = SVector::<f64, NX>::from_fn(|i, _| x[i]);
+    fn region(&self, x: &[f64; EXTENDED], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
+        let inner = from_fn::<f64, NX, _>(|i| x[i]);
         let mut own = [[0.0; NU]; 2];
         for (own, bounds) in own.iter_mut().zip(bounds) {
             own.copy_from_slice(bounds);
@@ -240,7 +240,7 @@ where
 /// use punctual_core::barriers::{DistanceDisc, Outside};
 /// use punctual_core::dynamics::WithPoint;
 /// use punctual_core::filter::{BarrierSettings, Filter};
-/// use punctual_reference::plants::Unicycle;
+/// use punctual_core::plants::Unicycle;
 ///
 /// // State (x_p, y_p, θ, v, p_x, p_y, v_x, v_y).
 /// let clear = Outside(DistanceDisc::new([0.0, 0.0], 2.0, 2.0)?.following(4));
@@ -265,23 +265,23 @@ where
         self.0.is_same(&other.0)
     }
 
-    fn drift<S: Scalar>(&self, x: &SVector<S, EXTENDED>) -> SVector<S, EXTENDED> {
+    fn drift<S: Scalar>(&self, x: &[S; EXTENDED]) -> [S; EXTENDED] {
         const { assert!(EXTENDED == NX + 4, "four states more than the plant inside") };
-        let f = self.0.drift(&SVector::<S, NX>::from_fn(|i, _| x[i]));
-        SVector::from_fn(|i, _| match i {
+        let f = self.0.drift(&from_fn::<S, NX, _>(|i| x[i]));
+        from_fn(|i| match i {
             i if i < NX => f[i],
             i if i < NX + 2 => x[i + 2],
             _ => S::zero(),
         })
     }
 
-    fn input_map<S: Scalar>(&self, x: &SVector<S, EXTENDED>) -> SMatrix<S, EXTENDED, NU> {
-        let g = self.0.input_map(&SVector::<S, NX>::from_fn(|i, _| x[i]));
-        SMatrix::from_fn(|i, j| if i < NX { g[(i, j)] } else { S::zero() })
+    fn input_map<S: Scalar>(&self, x: &[S; EXTENDED]) -> [[S; NU]; EXTENDED] {
+        let g = self.0.input_map(&from_fn::<S, NX, _>(|i| x[i]));
+        from_fn(|i| from_fn(|j| if i < NX { g[i][j] } else { S::zero() }))
     }
 
-    fn region(&self, x: &SVector<f64, EXTENDED>, bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
-        self.0.region(&SVector::from_fn(|i, _| x[i]), bounds, time)
+    fn region(&self, x: &[f64; EXTENDED], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
+        self.0.region(&from_fn(|i| x[i]), bounds, time)
     }
 }
 
@@ -302,10 +302,10 @@ pub trait DynPlant: Send {
     fn rk4_step(&self, x: &mut [f64], u: &[f64], dt: f64) -> Result<(), Error>;
 }
 
-/// The first `N` of the numbers `x`, as an array has them: nalgebra's own function copies a number that is not known beforehand.
+/// The first `N` of the numbers `x`.
 #[inline(always)]
-pub(crate) fn column<T: Scalar, const N: usize>(x: &[T]) -> SVector<T, N> {
-    SVector::from(*x.first_chunk().expect("a number for each component"))
+pub(crate) fn first<T: Scalar, const N: usize>(x: &[T]) -> [T; N] {
+    *x.first_chunk().expect("a number for each component")
 }
 
 /// Checks the lengths of a state and an input.
@@ -336,8 +336,8 @@ where
 
     fn rk4_step(&self, x: &mut [f64], u: &[f64], dt: f64) -> Result<(), Error> {
         check_lengths((x, NX), (u, NU))?;
-        let next = rk4_step(&self.0, &column(x), &column(u), dt);
-        x.copy_from_slice(next.as_slice());
+        let next = rk4_step(&self.0, &first(x), &first(u), dt);
+        x.copy_from_slice(&next);
         Ok(())
     }
 }
@@ -346,10 +346,10 @@ where
 /// fourth-order Runge-Kutta method.
 pub fn rk4_step<P, const NX: usize, const NU: usize>(
     plant: &P,
-    x: &SVector<f64, NX>,
-    u: &SVector<f64, NU>,
+    x: &[f64; NX],
+    u: &[f64; NU],
     dt: f64,
-) -> SVector<f64, NX>
+) -> [f64; NX]
 where
     P: ControlAffine<NX, NU>,
 {
@@ -359,14 +359,14 @@ where
 /// As [`rk4_step`], for any `derivative` of the state and any scalar.
 #[inline]
 pub fn rk4<S: Scalar, const NX: usize>(
-    derivative: impl Fn(&SVector<S, NX>) -> SVector<S, NX>,
-    x: &SVector<S, NX>,
+    derivative: impl Fn(&[S; NX]) -> [S; NX],
+    x: &[S; NX],
     dt: f64,
-) -> SVector<S, NX> {
-    let moved = |k: &SVector<S, NX>, by: f64| SVector::<S, NX>::from_fn(|i, _| x[i] + k[i] * by);
+) -> [S; NX] {
+    let moved = |k: &[S; NX], by: f64| from_fn::<S, NX, _>(|i| x[i] + k[i] * by);
     let k1 = derivative(x);
     let k2 = derivative(&moved(&k1, dt / 2.0));
     let k3 = derivative(&moved(&k2, dt / 2.0));
     let k4 = derivative(&moved(&k3, dt));
-    SVector::from_fn(|i, _| x[i] + (k1[i] + (k2[i] + k3[i]) * 2.0 + k4[i]) * (dt / 6.0))
+    from_fn(|i| x[i] + (k1[i] + (k2[i] + k3[i]) * 2.0 + k4[i]) * (dt / 6.0))
 }

@@ -7,7 +7,7 @@
 //! ```
 //! use punctual_core::barriers::DistanceDisc;
 //! use punctual_core::filter::{BarrierSettings, Filter};
-//! use punctual_reference::plants::PointMass;
+//! use punctual_core::plants::PointMass;
 //!
 //! // Reach the disc of radius 2 m around (45, 45) within 10 s.
 //! let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
@@ -49,13 +49,13 @@
 //! Each module uses only those above it: [`scalar`], [`jet`], [`interval`]; [`dynamics`] and [`barrier`]; [`lie`];
 //! [`convergence`] (plain numbers, no model); [`qp`] (linear algebra only); [`reach`] (what
 //! bounded inputs can do); `plan` (witnesses of a promise, a feature); [`filter`]. Beside it, [`barriers`] are regions and
-//! limits to use, and [`judge`] says what became of a promise. Reference plants, nominal controllers and the constraints of the literature are in the crate
-//! `punctual-reference`.
+//! limits to use, [`plants`] are vehicles, and [`judge`] says what became of a promise. Nominal controllers and the constraints of
+//! the literature are in the crate `punctual-reference`.
 //!
 //! # Dependencies in the interface
 //!
-//! Models are written with [`nalgebra`], which is part of this interface and exported again here. So a new minor version of
-//! it (0.x) comes with a new minor version of this crate, and with no other.
+//! Models are written with arrays and [`Scalar`](scalar::Scalar). Of another crate only the traits `Zero` and `One` of
+//! `num-traits` are part of this interface, as those of a scalar.
 //!
 //! # Features
 //!
@@ -99,6 +99,7 @@ pub mod judge;
 pub mod lie;
 #[cfg(feature = "plan")]
 pub mod plan;
+pub mod plants;
 pub mod qp;
 pub mod reach;
 #[cfg(feature = "serde")]
@@ -106,7 +107,14 @@ mod real;
 pub mod scalar;
 
 pub use error::{Error, ErrorKind};
-pub use nalgebra;
+
+/// What the crate `punctual-models` shares with this one. No part of the interface: it changes without notice.
+#[doc(hidden)]
+pub mod internal {
+    pub use crate::lie::ahead::{SUBSTEPS, is_even};
+    pub use crate::lie::degree::{Coefficients, relative_degree_of, samples};
+    pub use crate::lie::enclosure::{enclose, sharper};
+}
 
 /// Largest relative degree n supported: the order of the highest derivative of h that is taken.
 pub const MAX_RELATIVE_DEGREE: usize = 8;

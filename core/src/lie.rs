@@ -3,7 +3,7 @@
 //! Let x(t₀ + τ) solve `ẋ = f(x) + g(x) u` with a *constant* u. Its Taylor coefficients follow one
 //! after the other from `(k+1) x_{k+1} = [f(x) + g(x) u]_k`; then `h(t, x)` evaluated on that series
 //! has the coefficients `h⁽ᵏ⁾(t₀)/k!`. Series are taken at u = 0 with their derivatives along u
-//! ([`Response`]), so that at relative degree n
+//! (`Response`), so that at relative degree n
 //!
 //! ```math
 //! \begin{align}
@@ -16,24 +16,23 @@
 //! (for a time-varying h, L_f stands for ∂/∂t + L_f). All are exact up to round-off. The filter checks (3) at every
 //! evaluation, since an input that enters earlier invalidates every constraint built for n.
 
-mod ahead;
-mod degree;
+pub(crate) mod ahead;
+pub(crate) mod degree;
 mod embedded;
-mod enclosure;
+pub(crate) mod enclosure;
 mod external;
 mod source;
 
-pub use ahead::{Ahead, SUBSTEPS, flow, is_even};
+use ahead::SUBSTEPS;
+pub use ahead::{Ahead, flow};
 
 use alloc::boxed::Box;
 use core::any::Any;
 use core::array::from_fn;
 use core::marker::PhantomData;
 
-use nalgebra::SVector;
-
 use crate::barrier::Barrier;
-use crate::dynamics::{ControlAffine, column};
+use crate::dynamics::{ControlAffine, first};
 use crate::error::{Error, ErrorKind};
 use crate::interval::Interval;
 use crate::jet::{Dual, Response, Taylor};
@@ -41,9 +40,8 @@ use crate::scalar::all_finite;
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
 pub use crate::error::RelativeDegree;
-pub use degree::{Coefficients, detected, relative_degree, relative_degree_of, samples};
+pub use degree::{detected, relative_degree};
 pub use embedded::embedded;
-pub use enclosure::{enclose, sharper};
 pub use external::external;
 pub(crate) use source::FEW_ORDERS;
 pub use source::{
@@ -54,11 +52,11 @@ pub use source::{
 /// The Taylor series of h(t, x(t)) at `t` and `x` with u = 0, `K` coefficients, each with its
 /// derivatives along the `NU` inputs. This is (1)–(3) before multiplication by k!.
 #[inline]
-pub fn barrier_series<P, B, const NX: usize, const NU: usize, const K: usize>(
+pub(crate) fn barrier_series<P, B, const NX: usize, const NU: usize, const K: usize>(
     plant: &P,
     barrier: &B,
     t: f64,
-    x: &SVector<f64, NX>,
+    x: &[f64; NX],
 ) -> Response<NU, K>
 where
     P: ControlAffine<NX, NU>,
@@ -71,13 +69,13 @@ where
 #[inline]
 fn motion<P, const NX: usize, const NU: usize, const K: usize>(
     plant: &P,
-    x: &SVector<f64, NX>,
-) -> SVector<Response<NU, K>, NX>
+    x: &[f64; NX],
+) -> [Response<NU, K>; NX]
 where
     P: ControlAffine<NX, NU>,
 {
     const { assert!(K <= MAX_RELATIVE_DEGREE + 1, "orders 1 to 8 are spelled out below") };
-    let mut series = SVector::<Response<NU, K>, NX>::from_fn(|i, _| Response::from(x[i]));
+    let mut series = from_fn::<Response<NU, K>, NX, _>(|i| Response::from(x[i]));
     macro_rules! extend_to {
         ($($j:literal),*) => {
             $(if const { $j < K } {
@@ -94,17 +92,17 @@ where
 #[inline]
 fn extend<P, const NX: usize, const NU: usize, const K: usize, const J: usize>(
     plant: &P,
-    series: &mut SVector<Response<NU, K>, NX>,
+    series: &mut [Response<NU, K>; NX],
 ) where
     P: ControlAffine<NX, NU>,
 {
-    let known = SVector::<Response<NU, J>, NX>::from_fn(|i, _| series[i].truncated());
+    let known = from_fn::<Response<NU, J>, NX, _>(|i| series[i].truncated());
     let f = plant.drift(&known);
-    let g = plant.input_map(&SVector::<Taylor<f64, J>, NX>::from_fn(|i, _| known[i].series));
+    let g = plant.input_map(&from_fn::<Taylor<f64, J>, NX, _>(|i| known[i].series));
     let part = 1.0 / J as f64;
     for i in 0..NX {
         let (value, along) = f[i].coefficient(J - 1);
-        let gradient = from_fn(|m| (along[m] + g[(i, m)].coefficients[J - 1]) * part);
+        let gradient = from_fn(|m| (along[m] + g[i][m].coefficients[J - 1]) * part);
         series[i].set_coefficient(J, (value * part, gradient));
     }
 }
@@ -182,7 +180,7 @@ where
     }
 
     fn evaluate(&self, t: f64, x: &[f64], out: &mut Derivatives) {
-        Self::write(&barrier_series(&self.plant, &self.barrier, t, &column(x)), out);
+        Self::write(&barrier_series(&self.plant, &self.barrier, t, &first(x)), out);
     }
 
     fn predict(&self) -> Option<&dyn Predict> {
@@ -202,7 +200,7 @@ where
     }
 
     fn highest(&self, t: f64, x: &[f64], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<f64> {
-        let region = self.plant.region(&column(x), bounds, time)?;
+        let region = self.plant.region(&first(x), bounds, time)?;
         self.barrier.highest(time.map(|after| t + after), &region)
     }
 }
@@ -214,8 +212,8 @@ where
     B: Barrier<NX>,
 {
     fn flow(&self, x: &mut [f64], u: &[f64], duration: f64) {
-        let (from, held) = (column::<f64, NX>(x), column(u));
-        x.copy_from_slice(flow(&self.plant, &from, &held, duration, SUBSTEPS).as_slice());
+        let (from, held) = (first::<f64, NX>(x), first(u));
+        x.copy_from_slice(&flow(&self.plant, &from, &held, duration, SUBSTEPS));
     }
 
     fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
@@ -252,17 +250,17 @@ where
     }
 
     fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]) {
-        let (x, u) = (column::<f64, NX>(x), column(u));
-        out.copy_from_slice(self.plant.derivative(&x, &u).as_slice());
+        let (x, u) = (first::<f64, NX>(x), first(u));
+        out.copy_from_slice(&self.plant.derivative(&x, &u));
     }
 
     fn path(&self, x: &[f64], u: &[f64], out: &mut [Course]) {
-        let x = column::<f64, NX>(x);
+        let x = first::<f64, NX>(x);
         ahead::path::<P, NX, NU>(&self.plant, &x, u, out);
     }
 
     fn value(&self, t: f64, x: &[f64]) -> f64 {
-        self.barrier.value(t, &column(x))
+        self.barrier.value(t, &first(x))
     }
 
     fn value_along(&self, t: f64, path: &[Course], out: &mut Course) {
@@ -296,13 +294,13 @@ where
     }
 
     fn is_still(&self, x: &[f64]) -> Option<bool> {
-        let x = SVector::from_fn(|i, _| Interval::from(x[i]));
+        let x = from_fn(|i| Interval::from(x[i]));
         // Where time is not used, the bits are the same.
         Some(self.barrier.value(Interval::ALL, &x) == self.barrier.value(Interval::from(0.0), &x))
     }
 
     fn lowest_from(&self, t: f64, x: &[f64]) -> Option<f64> {
-        self.barrier.range_from(t, &column(x)).map(|[least, _]| least)
+        self.barrier.range_from(t, &first(x)).map(|[least, _]| least)
     }
 }
 
@@ -321,17 +319,17 @@ where
     }
 
     fn rooms(&self) -> [Box<dyn Any + Send>; 2] {
-        let motion = SVector::<Response<NU, K>, NX>::from_fn(|_, _| Response::from(0.0));
-        let ahead = SVector::<Taylor<Dual<NU>, N>, NX>::from_fn(|_, _| Taylor::from(0.0));
+        let motion = from_fn::<Response<NU, K>, NX, _>(|_| Response::from(0.0));
+        let ahead = from_fn::<Taylor<Dual<NU>, N>, NX, _>(|_| Taylor::from(0.0));
         [Box::new(motion), Box::new(ahead)]
     }
 
     fn motion(&self, x: &[f64], room: &mut dyn Any) {
-        *room.downcast_mut().expect(ROOM) = motion::<P, NX, NU, K>(&self.plant, &column(x));
+        *room.downcast_mut().expect(ROOM) = motion::<P, NX, NU, K>(&self.plant, &first(x));
     }
 
     fn evaluate_along(&self, t: f64, motion: &dyn Any, out: &mut Derivatives) {
-        let motion: &SVector<Response<NU, K>, NX> = motion.downcast_ref().expect(ROOM);
+        let motion: &[Response<NU, K>; NX] = motion.downcast_ref().expect(ROOM);
         Self::write(&self.barrier.value(Response::time(t), motion), out);
     }
 
@@ -340,7 +338,7 @@ where
     }
 
     fn ahead_of_row_along(&self, t: f64, motion: &dyn Any, out: &mut Ahead) {
-        let motion: &SVector<Taylor<Dual<NU>, N>, NX> = motion.downcast_ref().expect(ROOM);
+        let motion: &[Taylor<Dual<NU>, N>; NX] = motion.downcast_ref().expect(ROOM);
         ahead::evaluate(&self.barrier, t, motion, out);
     }
 }

@@ -28,7 +28,7 @@ fn slices<'a>(bounds: &'a Bounds, source: &dyn DerivativeSource) -> [&'a [f64]; 
 
 /// Whether no input within `bounds` has h ≥ 0 at `after` ≥ 0 s after time `t` and state `x`. False where
 /// it is possible or not known. `size` is that of h on the way: 1e-9 of it counts as round-off.
-pub fn ruled_out(
+pub(crate) fn ruled_out(
     source: &dyn DerivativeSource,
     (t, x): (f64, &[f64]),
     bounds: &Bounds,
@@ -45,7 +45,7 @@ pub fn ruled_out(
 ///
 /// ```
 /// use punctual_core::barriers::HalfPlane;
-/// use punctual_reference::plants::PointMass;
+/// use punctual_core::plants::PointMass;
 /// use punctual_core::{lie, qp::Bounds, reach};
 ///
 /// // 9 m from rest with 2 m/s²: 3 s.

@@ -3,6 +3,7 @@
 //! ([`Taylor`](crate::jet::Taylor)).
 
 use core::cmp::Ordering;
+use core::fmt::Debug;
 use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
 use num_traits::{One, Zero};
@@ -16,8 +17,10 @@ use crate::elementary;
 /// domain (`sqrt` of a negative number) and at singular points (`sqrt` at 0) a result or one of its
 /// derivatives is not finite, which the filter reports as a status.
 pub trait Scalar:
-    nalgebra::Scalar
-    + Copy
+    Copy
+    + Debug
+    + PartialEq
+    + 'static
     + Zero
     + One
     + From<f64>

@@ -7,8 +7,8 @@ mod scenario;
 use punctual_core::convergence::repeated_root;
 use punctual_core::filter::{BarrierSettings, Filter, Method, SampleDerivative, Sampling, Status};
 use punctual_core::lie::Direction;
+use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 use punctual_core::qp::Solver;
-use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
 use scenario::{distance_disc, one, quadratic_disc};
 
 /// Number of allocations that `work` makes on this thread.

@@ -9,7 +9,7 @@ use punctual_core::filter::{
     Status,
 };
 use punctual_core::lie::Direction;
-use punctual_reference::plants::PointMass;
+use punctual_core::plants::PointMass;
 
 const BOUNDS: [f64; 2] = [8.0, 6.0];
 const AFTER: f64 = 0.35;

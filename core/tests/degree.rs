@@ -7,10 +7,9 @@ use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::dynamics::{ControlAffine, DynPlant, IntegratedInput, rk4_step};
 use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder};
 use punctual_core::lie::{self, Derivatives, RelativeDegree, detected, relative_degree};
-use punctual_core::nalgebra::{SMatrix, SVector, Vector4, vector};
+use punctual_core::plants::{KinematicBicycle, PointMass, SmallSlipBicycle, Steering, Unicycle};
 use punctual_core::scalar::Scalar;
 use punctual_core::{Error, ErrorKind};
-use punctual_reference::plants::{KinematicBicycle, PointMass, SmallSlipBicycle, Steering, Unicycle};
 use punctual_reference::simulation::{Schedule, closed_loop};
 use support::{
     Cart, Chain4, Chain8, Exponential, Logarithmic, MovingDisc, Powers, SecondState, SpeedLimit, Uncoupled,
@@ -60,9 +59,9 @@ fn other_systems_have_theirs() {
     assert_eq!(detected(&Unicycle, &SpeedLimit), RelativeDegree::Uniform(1), "steering never enters");
     assert_eq!(detected(&small_slip(), &SpeedLimit), RelativeDegree::Uniform(1), "nor does slip");
     assert_eq!(detected(&Cart, &Powers), RelativeDegree::Uniform(2));
-    let x = vector![0.25, 0.5, -1.0, 1.5];
+    let x = [0.25, 0.5, -1.0, 1.5];
     assert_eq!(relative_degree(&Chain4, &Logarithmic, 0.0, &[x]), RelativeDegree::Uniform(4));
-    let x = vector![0.5, -0.25, 0.75, 1.0, -0.5, 0.125, -1.25, 2.0];
+    let x = [0.5, -0.25, 0.75, 1.0, -0.5, 0.125, -1.25, 2.0];
     assert_eq!(relative_degree(&Chain8, &Exponential, 0.0, &[x]), RelativeDegree::Uniform(8));
 }
 
@@ -74,7 +73,7 @@ fn it_does_not_exist_where_no_input_reaches() {
         detected::<_, _, 9, 1>(&IntegratedInput::<_, 8>::new(Chain8, 0), &FirstOfNine),
         RelativeDegree::Unreached
     );
-    let not_finite = vector![f64::NAN, 0.0];
+    let not_finite = [f64::NAN, 0.0];
     assert_eq!(relative_degree(&Cart, &Powers, 0.0, &[not_finite]), RelativeDegree::NotFinite);
     assert_eq!(relative_degree(&Cart, &Powers, 0.0, &[]), RelativeDegree::NotFinite);
 }
@@ -83,7 +82,7 @@ fn it_does_not_exist_where_no_input_reaches() {
 struct FirstOfNine;
 
 impl Barrier<9> for FirstOfNine {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 9>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; 9]) -> S {
         x[0]
     }
 }
@@ -91,9 +90,9 @@ impl Barrier<9> for FirstOfNine {
 /// At one sample the row can vanish by accident; its neighbours decide.
 #[test]
 fn a_singular_sample_does_not_mislead() {
-    let centre = vector![45.0, 45.0, 0.0, 0.0];
+    let centre = [45.0, 45.0, 0.0, 0.0];
     assert_eq!(relative_degree(&PointMass, &quadratic_disc(), 0.0, &[centre]), RelativeDegree::Uniform(2));
-    let standing_across = vector![0.0, 0.0, 2.0, 0.0];
+    let standing_across = [0.0, 0.0, 2.0, 0.0];
     assert_eq!(
         relative_degree(&Unicycle, &quadratic_disc(), 0.0, &[standing_across]),
         RelativeDegree::Uniform(2)
@@ -118,12 +117,12 @@ fn the_small_slip_bicycle_is_mixed_and_refused() {
 struct Valve;
 
 impl ControlAffine<2, 1> for Valve {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-        SVector::from([if x[0].value() > 0.0 { S::zero() } else { x[1] }, S::zero()])
+    fn drift<S: Scalar>(&self, x: &[S; 2]) -> [S; 2] {
+        [if x[0].value() > 0.0 { S::zero() } else { x[1] }, S::zero()]
     }
-    fn input_map<S: Scalar>(&self, x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
+    fn input_map<S: Scalar>(&self, x: &[S; 2]) -> [[S; 1]; 2] {
         let direct = if x[0].value() > 0.0 { S::one() } else { S::zero() };
-        SMatrix::from([[direct, S::one()]])
+        [[direct], [S::one()]]
     }
 }
 
@@ -131,7 +130,7 @@ impl ControlAffine<2, 1> for Valve {
 struct First;
 
 impl<const NX: usize> Barrier<NX> for First {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, NX>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; NX]) -> S {
         x[0]
     }
 }
@@ -158,13 +157,13 @@ fn what_no_input_reaches_is_refused() {
 
 #[test]
 fn a_declared_degree_is_compared() {
-    let declared = |n: usize, samples: &[Vector4<f64>]| {
+    let declared = |n: usize, samples: &[[f64; 4]]| {
         Filter::builder(4, 2)
             .barrier_of_degree("goal", Unicycle, distance_disc(), (n, samples), BarrierSettings::within(5.0))
             .and_then(FilterBuilder::build)
             .map(|f| f.relative_degrees().collect::<Vec<_>>())
     };
-    let x = [vector![1.0, 2.0, 3.0, 4.0]];
+    let x = [[1.0, 2.0, 3.0, 4.0]];
     assert_eq!(declared(2, &x), Ok(vec![2]));
     for n in [0, 1, 3] {
         assert_eq!(
@@ -202,10 +201,10 @@ where
     let disc = DistanceDisc::new([20.0, 10.0], 2.0, 2.0).expect("valid disc");
     let mut filter = filter_of(plant, disc).expect("uniform");
     let schedule = Schedule { step: 1e-3, steps: 10_000, substeps: 1 };
-    let x0 = SVector::from([0.0, 0.0, 0.4, 3.0, 0.0]);
+    let x0 = [0.0, 0.0, 0.4, 3.0, 0.0];
     let mut kept = true;
     // Damping of the speed; the wheel is turned back.
-    let nominal = |_: f64, x: &SVector<f64, 5>| vector![-x[3], -2.0 * x[4]];
+    let nominal = |_: f64, x: &[f64; 5]| [-x[3], -2.0 * x[4]];
     closed_loop(&mut filter, &plant, x0, schedule, nominal, |t, _, _, report| {
         kept &= report.status.is_satisfied() && (t < deadline || report.barriers[0].h >= 0.0);
     })
@@ -216,13 +215,13 @@ where
 /// A held slip angle is the state that its integrator holds: both models move alike.
 #[test]
 fn an_integrated_input_is_the_input() {
-    let mut held = vector![1.0, -2.0, 0.5, 4.0];
-    let mut state = SVector::from([1.0, -2.0, 0.5, 4.0, 0.125]);
+    let mut held = [1.0, -2.0, 0.5, 4.0];
+    let mut state = [1.0, -2.0, 0.5, 4.0, 0.125];
     for _ in 0..100 {
-        held = rk4_step(&small_slip(), &held, &vector![0.75, 0.125], 0.01);
-        state = rk4_step(&small_slip().with_rate(), &state, &vector![0.75, 0.0], 0.01);
+        held = rk4_step(&small_slip(), &held, &[0.75, 0.125], 0.01);
+        state = rk4_step(&small_slip().with_rate(), &state, &[0.75, 0.0], 0.01);
     }
-    assert_eq!(state.fixed_rows::<4>(0), held);
+    assert_eq!(state[..4], held);
     assert_eq!(state[4], 0.125);
 }
 
@@ -232,8 +231,8 @@ fn the_kinematic_bicycle_is_the_small_slip_one_for_small_angles() {
     const DELTA: f64 = 1e-3;
     let beta = DELTA * 1.6 / 2.8;
     let x = [3.0, 1.0, 0.7, 5.0];
-    let exact = kinematic().drift(&SVector::from([x[0], x[1], x[2], x[3], DELTA]));
-    let small = SmallSlipBicycle::new(1.6).expect("valid").derivative(&SVector::from(x), &vector![0.0, beta]);
+    let exact = kinematic().drift(&[x[0], x[1], x[2], x[3], DELTA]);
+    let small = SmallSlipBicycle::new(1.6).expect("valid").derivative(&x, &[0.0, beta]);
     for i in 0..4 {
         assert!((exact[i] - small[i]).abs() <= x[3] * beta * beta, "{i}: {} {}", exact[i], small[i]);
     }
@@ -243,16 +242,16 @@ fn the_kinematic_bicycle_is_the_small_slip_one_for_small_angles() {
 #[test]
 fn a_steered_bicycle_is_one_with_an_angle_at_rest() {
     const DELTA: f64 = 0.4;
-    let mut state = SVector::from([1.0, -2.0, 0.5, 4.0, DELTA]);
+    let mut state = [1.0, -2.0, 0.5, 4.0, DELTA];
     let [mut by_angle, mut by_slip] = [[1.0, -2.0, 0.5, 4.0]; 2];
     let beta = (1.6 / 2.8 * DELTA.tan()).atan();
     assert!((kinematic().steering_angle(beta) - DELTA).abs() < 1e-15);
     for _ in 0..100 {
-        state = rk4_step(&kinematic(), &state, &vector![0.75, 0.0], 0.01);
+        state = rk4_step(&kinematic(), &state, &[0.75, 0.0], 0.01);
         kinematic().steered(Steering::Angle).rk4_step(&mut by_angle, &[0.75, DELTA], 0.01).unwrap();
         kinematic().steered(Steering::SlipAngle).rk4_step(&mut by_slip, &[0.75, beta], 0.01).unwrap();
     }
-    assert_eq!(state.as_slice()[..4], by_angle);
+    assert_eq!(state[..4], by_angle);
     // β is rounded once more.
     assert!(by_angle.iter().zip(by_slip).all(|(a, b)| (a - b).abs() < 1e-13), "{by_angle:?} {by_slip:?}");
     let refused = kinematic().steered(Steering::Angle).rk4_step(&mut by_angle, &[0.0; 3], 0.1);
@@ -298,21 +297,14 @@ fn a_point_mass_stays_in_a_moving_disc() {
     let mut filter = filter_of(PointMass, goal).expect("valid");
     let schedule = Schedule { step: 1e-3, steps: 10_000, substeps: 1 };
     let mut outside = 0.0_f64;
-    let nominal = |_: f64, x: &Vector4<f64>| vector![velocity[0] - x[2], velocity[1] - x[3]];
-    closed_loop(
-        &mut filter,
-        &PointMass,
-        vector![0.0, 0.0, -2.0, 1.0],
-        schedule,
-        nominal,
-        |t, x, _, report| {
-            assert!(report.status.is_satisfied() && report.barriers[0].on_course, "at {t}");
-            if t >= 5.0 {
-                let distance = (x[0] - 20.0 - 3.0 * t).hypot(x[1] - 5.0 - t);
-                outside = outside.max(distance - 2.0);
-            }
-        },
-    )
+    let nominal = |_: f64, x: &[f64; 4]| [velocity[0] - x[2], velocity[1] - x[3]];
+    closed_loop(&mut filter, &PointMass, [0.0, 0.0, -2.0, 1.0], schedule, nominal, |t, x, _, report| {
+        assert!(report.status.is_satisfied() && report.barriers[0].on_course, "at {t}");
+        if t >= 5.0 {
+            let distance = (x[0] - 20.0 - 3.0 * t).hypot(x[1] - 5.0 - t);
+            outside = outside.max(distance - 2.0);
+        }
+    })
     .expect("valid schedule");
     assert_eq!(outside, 0.0, "from the deadline on");
 }
@@ -324,18 +316,11 @@ fn an_obstacle_on_the_move_is_avoided() {
     let mut filter = filter_of(PointMass, Outside(obstacle.expect("valid"))).expect("valid");
     let schedule = Schedule { step: 1e-3, steps: 10_000, substeps: 1 };
     let mut closest = f64::INFINITY;
-    let nominal = |_: f64, x: &Vector4<f64>| vector![2.0 - x[2], -x[1] - x[3]];
-    closed_loop(
-        &mut filter,
-        &PointMass,
-        vector![0.0, 0.0, 2.0, 0.0],
-        schedule,
-        nominal,
-        |t, x, _, report| {
-            assert!(report.status.is_satisfied(), "{:?} at {t}", report.status);
-            closest = closest.min((x[0] - 10.0 + t).hypot(x[1] - 0.5) - 2.0);
-        },
-    )
+    let nominal = |_: f64, x: &[f64; 4]| [2.0 - x[2], -x[1] - x[3]];
+    closed_loop(&mut filter, &PointMass, [0.0, 0.0, 2.0, 0.0], schedule, nominal, |t, x, _, report| {
+        assert!(report.status.is_satisfied(), "{:?} at {t}", report.status);
+        closest = closest.min((x[0] - 10.0 + t).hypot(x[1] - 0.5) - 2.0);
+    })
     .expect("valid schedule");
     assert!((0.0..0.5).contains(&closest), "it passes at {closest} m");
 }

@@ -2,7 +2,7 @@
 
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::lie::{Ahead, DerivativeSource, Derivatives, Direction, along, embedded, external};
-use punctual_reference::plants::PointMass;
+use punctual_core::plants::PointMass;
 
 const X: [f64; 7] = [9.0, 2.0, 0.4, 0.3, 9.0, 9.0, 1.0];
 const OWN: [f64; 4] = [1.0, 2.0, 0.3, 0.4];

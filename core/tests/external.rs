@@ -4,7 +4,7 @@
 use punctual_core::barriers::{DistanceDisc, NormBound};
 use punctual_core::filter::{BarrierSettings, Filter, SampleDerivative, Sampling, Status};
 use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives, Direction};
-use punctual_reference::plants::Unicycle;
+use punctual_core::plants::Unicycle;
 
 /// Of numbers of order 1 to 10: two ways through the same dozen operations.
 const ROUND_OFF: f64 = 1e-12;

@@ -10,9 +10,8 @@ use punctual_core::filter::{
     BarrierSettings, Filter, FilterBuilder, FilterState, Method, Phase, Sampling, Status,
 };
 use punctual_core::lie;
-use punctual_core::nalgebra::{SVector, vector};
+use punctual_core::plants::{PointMass, Unicycle};
 use punctual_core::qp::Solver;
-use punctual_reference::plants::{PointMass, Unicycle};
 use punctual_reference::simulation::{Schedule, closed_loop};
 use scenario::{Integrator, NonNegative, damping, distance_disc, goal, one, quadratic_disc, speed_damping};
 
@@ -43,25 +42,18 @@ fn phases_follow_one_another() {
     let mut phases = vec![Phase::Waiting];
     let schedule = Schedule { step: 0.01, steps: 1000, substeps: 1 };
     let mut arrival = None;
-    closed_loop(
-        &mut filter,
-        &PointMass,
-        vector![40.0, 38.0, 0.0, 0.0],
-        schedule,
-        damping,
-        |t, _, _, report| {
-            let b = &report.barriers[0];
-            if phases.last() != Some(&b.phase) {
-                phases.push(b.phase);
-            }
-            if b.h >= 0.0 && arrival.is_none() {
-                arrival = Some(t);
-            }
-            assert_eq!((b.arrived, b.arrival_time), (arrival.is_some(), arrival), "at {t}");
-            assert_eq!(b.time_left, (5.0 - t).max(0.0), "at {t}");
-            assert!(b.on_course, "at {t}");
-        },
-    )
+    closed_loop(&mut filter, &PointMass, [40.0, 38.0, 0.0, 0.0], schedule, damping, |t, _, _, report| {
+        let b = &report.barriers[0];
+        if phases.last() != Some(&b.phase) {
+            phases.push(b.phase);
+        }
+        if b.h >= 0.0 && arrival.is_none() {
+            arrival = Some(t);
+        }
+        assert_eq!((b.arrived, b.arrival_time), (arrival.is_some(), arrival), "at {t}");
+        assert_eq!(b.time_left, (5.0 - t).max(0.0), "at {t}");
+        assert!(b.on_course, "at {t}");
+    })
     .expect("valid schedule");
     assert_eq!(phases, [Phase::Waiting, Phase::Approach, Phase::Stay]);
 }
@@ -99,7 +91,7 @@ fn a_start_inside_stays() {
         BarrierSettings { method: Method::RepeatedRoot, ..BarrierSettings::within(5.0) },
     ] {
         let mut filter = goal(settings);
-        let x0 = vector![44.0, 45.5, 0.25, 0.0];
+        let x0 = [44.0, 45.5, 0.25, 0.0];
         let schedule = Schedule { step: 0.01, steps: 800, substeps: 1 };
         closed_loop(&mut filter, &PointMass, x0, schedule, damping, |t, _, _, report| {
             let b = &report.barriers[0];
@@ -167,7 +159,7 @@ fn the_margin_is_reached_by_the_deadline_and_kept() {
     let margin = 0.25;
     let mut filter = goal(BarrierSettings { margin, ..BarrierSettings::within(5.0) });
     let schedule = Schedule { step: 1e-3, steps: 10_000, substeps: 1 };
-    let x0 = vector![10.0, 20.0, 3.0, -2.0];
+    let x0 = [10.0, 20.0, 3.0, -2.0];
     closed_loop(&mut filter, &PointMass, x0, schedule, damping, |t, _, _, report| {
         let b = &report.barriers[0];
         if t >= 5.0 {
@@ -185,12 +177,8 @@ fn the_margin_is_reached_by_the_deadline_and_kept() {
 
 /// h ≥ profile − Mδ/a² (`docs/theory.md#pointwise`): (D + a)² e falls from ≥ 0 to at least −Mδ while the input
 /// is held, and Mδ is seen at the next sample as the slack of its row at the input that was held.
-fn follows_its_profile<P>(
-    plant: &P,
-    damping: fn(f64, &SVector<f64, 4>) -> SVector<f64, 2>,
-    step: f64,
-    x0: [f64; 4],
-) where
+fn follows_its_profile<P>(plant: &P, damping: fn(f64, &[f64; 4]) -> [f64; 2], step: f64, x0: [f64; 4])
+where
     P: ControlAffine<4, 2> + Send + Clone + 'static,
 {
     /// The slack is seen at the ends of the periods; within one it may dip a little lower.
@@ -199,7 +187,7 @@ fn follows_its_profile<P>(
     let mut filter = pointwise(plant.clone(), distance_disc(), settings);
     let (mut deficit, mut held, mut compared) = (0.0_f64, None, 0);
     let schedule = Schedule { step, steps: (5.0 / step) as usize, substeps: 4 };
-    closed_loop(&mut filter, plant, x0.into(), schedule, damping, |t, _, u, report| {
+    closed_loop(&mut filter, plant, x0, schedule, damping, |t, _, u, report| {
         let b = &report.barriers[0];
         assert!(report.status.is_satisfied(), "{:?} at {t}", report.status);
         if b.phase != Phase::Approach {
@@ -207,8 +195,8 @@ fn follows_its_profile<P>(
             return;
         }
         if let Some(held) = held {
-            let held: SVector<f64, 2> = held;
-            deficit = deficit.max(-b.row.slack(held.as_slice()));
+            let held: [f64; 2] = held;
+            deficit = deficit.max(-b.row.slack(&held));
             compared += 1;
         }
         let allowed = WITHIN_THE_PERIOD * deficit / (5.0 * 5.0) + 1e-12 * (b.h.abs() + 1.0);
@@ -248,11 +236,11 @@ fn the_arrival_of_a_bounded_one_dimensional_run_is_on_time() {
     closed_loop(
         &mut filter,
         &Integrator::<2>,
-        vector![-1.0, 0.0],
+        [-1.0, 0.0],
         schedule,
-        |_, _| vector![0.0],
+        |_, _| [0.0],
         |t, _, u, r| {
-            assert!(u[0].abs() <= 1.0 && r.status.is_satisfied(), "{u} {:?} at {t}", r.status);
+            assert!(u[0].abs() <= 1.0 && r.status.is_satisfied(), "{u:?} {:?} at {t}", r.status);
             assert!(t < 5.0 || r.barriers[0].h >= 0.0, "h = {} at {t}", r.barriers[0].h);
         },
     )
@@ -289,10 +277,10 @@ proptest! {
         let (mut whole, mut first, mut second) = (build(), build(), build());
         // Something else first: nothing of it may survive `restore`.
         step(&mut second, 0.7, &[45.0, 45.0, 1.0, 1.0]);
-        let mut x = SVector::<f64, 4>::from(x0);
+        let mut x = x0;
         for k in 0..80 {
             let t = k as f64 * 0.05;
-            let (wanted, status) = step(&mut whole, t, x.as_slice());
+            let (wanted, status) = step(&mut whole, t, &x);
             let other = if k < interrupt {
                 &mut first
             } else {
@@ -301,11 +289,11 @@ proptest! {
                 }
                 &mut second
             };
-            let (u, other_status) = step(other, t, x.as_slice());
+            let (u, other_status) = step(other, t, &x);
             prop_assert_eq!(u.map(f64::to_bits), wanted.map(f64::to_bits), "at {}", t);
             prop_assert_eq!(status, other_status);
             prop_assert_eq!(whole.report(), other.report());
-            x = punctual_core::dynamics::rk4_step(&PointMass, &x, &SVector::from(u), 0.05);
+            x = punctual_core::dynamics::rk4_step(&PointMass, &x, &u, 0.05);
         }
     }
 
@@ -344,21 +332,14 @@ fn two_barriers_are_both_met() {
     assert_eq!(filter.relative_degrees().collect::<Vec<_>>(), [2, 2]);
     let schedule = Schedule { step: 0.01, steps: 1000, substeps: 1 };
     let mut solved = 0;
-    closed_loop(
-        &mut filter,
-        &PointMass,
-        vector![-6.0, 20.0, 0.0, 0.0],
-        schedule,
-        damping,
-        |t, _, _, report| {
-            assert!(report.status.is_satisfied(), "{:?} at {t}", report.status);
-            solved += u32::from(report.solver != Solver::Unchanged);
-            assert_eq!(report.solver == Solver::DualActiveSet, report.iterations > 0, "at {t}");
-            // The second barrier has no margin: it may be missed by the sampling error, below a centimetre.
-            assert!(t < 2.0 || report.barriers[1].h >= -0.01, "line {} at {t}", report.barriers[1].h);
-            assert!(t < 5.0 || report.barriers[0].h >= 0.0, "goal {} at {t}", report.barriers[0].h);
-        },
-    )
+    closed_loop(&mut filter, &PointMass, [-6.0, 20.0, 0.0, 0.0], schedule, damping, |t, _, _, report| {
+        assert!(report.status.is_satisfied(), "{:?} at {t}", report.status);
+        solved += u32::from(report.solver != Solver::Unchanged);
+        assert_eq!(report.solver == Solver::DualActiveSet, report.iterations > 0, "at {t}");
+        // The second barrier has no margin: it may be missed by the sampling error, below a centimetre.
+        assert!(t < 2.0 || report.barriers[1].h >= -0.01, "line {} at {t}", report.barriers[1].h);
+        assert!(t < 5.0 || report.barriers[0].h >= 0.0, "goal {} at {t}", report.barriers[0].h);
+    })
     .expect("valid schedule");
     assert!(solved > 100, "{solved} steps");
 }

@@ -3,7 +3,6 @@
 
 #![expect(clippy::print_stdout, reason = "the figures of tests/nightly")]
 
-use nalgebra::{SMatrix, SVector};
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, Outside, StateBound};
 use punctual_core::dynamics::ControlAffine;
@@ -11,8 +10,8 @@ use punctual_core::filter::{
     BarrierSettings, Begin, End, Filter, FilterBuilder, FilterState, Plans, Sampling, Standing,
 };
 use punctual_core::plan::Failure;
+use punctual_core::plants::{PointMass, Unicycle};
 use punctual_core::scalar::Scalar;
-use punctual_reference::plants::{PointMass, Unicycle};
 
 const PERIOD: f64 = 0.05;
 const HORIZON: f64 = 8.0;
@@ -37,13 +36,13 @@ impl Random {
 struct Glider(f64);
 
 impl ControlAffine<3, 1> for Glider {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+    fn drift<S: Scalar>(&self, x: &[S; 3]) -> [S; 3] {
         let (sin, cos) = x[2].sin_cos();
-        SVector::from([cos * S::from(self.0), sin * S::from(self.0), S::zero()])
+        [cos * S::from(self.0), sin * S::from(self.0), S::zero()]
     }
 
-    fn input_map<S: Scalar>(&self, _: &SVector<S, 3>) -> SMatrix<S, 3, 1> {
-        SMatrix::from([[S::zero(), S::zero(), S::one()]])
+    fn input_map<S: Scalar>(&self, _: &[S; 3]) -> [[S; 1]; 3] {
+        [[S::zero()], [S::zero()], [S::one()]]
     }
 }
 
@@ -64,7 +63,7 @@ impl Circling {
 }
 
 impl<const NX: usize> Barrier<NX> for Circling {
-    fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
+    fn value<S: Scalar>(&self, t: S, x: &[S; NX]) -> S {
         let (sin, cos) = (t * S::from(self.turning)).sin_cos();
         let dx = x[0] - cos * S::from(self.arm) - S::from(self.centre[0]);
         let dy = x[1] - sin * S::from(self.arm) - S::from(self.centre[1]);
@@ -313,7 +312,7 @@ fn a_set_that_goes_round_is_stayed_in() {
 struct Fleeing;
 
 impl<const NX: usize> Barrier<NX> for Fleeing {
-    fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
+    fn value<S: Scalar>(&self, t: S, x: &[S; NX]) -> S {
         let off = x[0] - t * t * t * 0.02;
         S::from(4.0) - off * off
     }
@@ -391,7 +390,7 @@ struct Pulse {
 }
 
 impl<const NX: usize> Barrier<NX> for Pulse {
-    fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
+    fn value<S: Scalar>(&self, t: S, x: &[S; NX]) -> S {
         let off = (t - self.at) / self.width;
         -(x[0] * x[0] + x[1] * x[1]) / 9.0 + 5.0 - (-(off * off)).exp() * self.depth
     }

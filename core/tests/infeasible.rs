@@ -7,8 +7,8 @@ mod quadratic;
 
 use punctual_core::barriers::HalfPlane;
 use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Sampling, Status, Strictness};
+use punctual_core::plants::PointMass;
 use punctual_core::qp::{Bounds, Enforcement, Outcome, Problem, Row, Workspace};
-use punctual_reference::plants::PointMass;
 use quadratic::{bounds, row};
 
 const NO_LIMIT: f64 = 1e6;

@@ -7,7 +7,7 @@ mod support;
 use punctual_core::ErrorKind;
 use punctual_core::filter::{BarrierSettings, Filter, Status};
 use punctual_core::lie::{self, Ahead, Derivatives};
-use punctual_reference::plants::{PointMass, Unicycle};
+use punctual_core::plants::{PointMass, Unicycle};
 use support::{SpeedLimit, quadratic_disc, source};
 
 const VALUES: &str = include_str!("cas/values.csv");

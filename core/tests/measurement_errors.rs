@@ -6,7 +6,7 @@ use punctual_core::Error;
 use punctual_core::barriers::StateBound;
 use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Method, SampleDerivative, Sampling};
 use punctual_core::lie;
-use punctual_reference::plants::{PointMass, Unicycle};
+use punctual_core::plants::{PointMass, Unicycle};
 use support::distance_disc;
 
 const PERIOD: f64 = 0.01;

@@ -7,7 +7,6 @@ mod scenario;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use nalgebra::{SMatrix, SVector};
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, Outside, QuadraticDisc, StateBound};
 use punctual_core::dynamics::{ControlAffine, rk4_step};
@@ -17,8 +16,8 @@ use punctual_core::filter::{
 };
 use punctual_core::lie::{Direction, along};
 use punctual_core::plan::Failure;
+use punctual_core::plants::{Bicycle, MovedPoint, PointMass, SmallSlipBicycle, Unicycle};
 use punctual_core::scalar::Scalar;
-use punctual_reference::plants::{Bicycle, MovedPoint, PointMass, SmallSlipBicycle, Unicycle};
 use scenario::{Integrator, NonNegative};
 
 const PERIOD: f64 = 0.02;
@@ -635,12 +634,12 @@ fn the_cost_of_a_step_does_not_grow_as_it_gets_shorter() {
     #[derive(Clone, Copy, Debug)]
     struct Counted;
     impl ControlAffine<4, 2> for Counted {
-        fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
+        fn drift<S: Scalar>(&self, x: &[S; 4]) -> [S; 4] {
             ASKED.fetch_add(1, Ordering::Relaxed);
             Unicycle.drift(x)
         }
 
-        fn input_map<S: Scalar>(&self, x: &SVector<S, 4>) -> SMatrix<S, 4, 2> {
+        fn input_map<S: Scalar>(&self, x: &[S; 4]) -> [[S; 2]; 4] {
             Unicycle.input_map(x)
         }
     }
@@ -1716,12 +1715,12 @@ fn armed_again_between_samples_of_another_period_it_follows_the_plan() {
 struct Tank(f64);
 
 impl ControlAffine<1, 1> for Tank {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
-        SVector::from([x[0].sqrt() * -self.0])
+    fn drift<S: Scalar>(&self, x: &[S; 1]) -> [S; 1] {
+        [x[0].sqrt() * -self.0]
     }
 
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 1>) -> SMatrix<S, 1, 1> {
-        SMatrix::identity()
+    fn input_map<S: Scalar>(&self, _x: &[S; 1]) -> [[S; 1]; 1] {
+        [[S::one()]]
     }
 }
 
@@ -1730,12 +1729,12 @@ impl ControlAffine<1, 1> for Tank {
 struct FirstOrder(f64);
 
 impl ControlAffine<1, 1> for FirstOrder {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
-        SVector::from([x[0] * self.0])
+    fn drift<S: Scalar>(&self, x: &[S; 1]) -> [S; 1] {
+        [x[0] * self.0]
     }
 
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 1>) -> SMatrix<S, 1, 1> {
-        SMatrix::identity()
+    fn input_map<S: Scalar>(&self, _x: &[S; 1]) -> [[S; 1]; 1] {
+        [[S::one()]]
     }
 }
 
@@ -1744,12 +1743,12 @@ impl ControlAffine<1, 1> for FirstOrder {
 struct Motor([f64; 2]);
 
 impl ControlAffine<2, 1> for Motor {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-        SVector::from([x[1] - x[0] * self.0[0], -(x[1] * self.0[1]) - x[0]])
+    fn drift<S: Scalar>(&self, x: &[S; 2]) -> [S; 2] {
+        [x[1] - x[0] * self.0[0], -(x[1] * self.0[1]) - x[0]]
     }
 
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
-        SMatrix::from([[S::zero(), S::one()]])
+    fn input_map<S: Scalar>(&self, _x: &[S; 2]) -> [[S; 1]; 2] {
+        [[S::zero()], [S::one()]]
     }
 }
 
@@ -1758,7 +1757,7 @@ impl ControlAffine<2, 1> for Motor {
 struct Band(f64, f64);
 
 impl<const NX: usize> Barrier<NX> for Band {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, NX>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; NX]) -> S {
         -(x[0] - self.0).squared() + self.1 * self.1
     }
 }
@@ -1783,7 +1782,7 @@ fn kept<P, const NX: usize>(
         .and_then(FilterBuilder::build)
         .expect("valid filter");
     let mut filter = filter.with_plans(period).expect("plans");
-    let mut x = SVector::from(from);
+    let mut x = from;
     for k in 0..2 * steps {
         let (t, mut u) = (f64::from(k) * period, [0.0]);
         let wanted = match wish {
@@ -1798,18 +1797,15 @@ fn kept<P, const NX: usize>(
                 }
             }
         };
-        let assurance = filter
-            .step(t, x.as_slice(), &[wanted], &mut u)
-            .expect("right dimensions")
-            .assurance
-            .expect("plans");
+        let assurance =
+            filter.step(t, &x, &[wanted], &mut u).expect("right dimensions").assurance.expect("plans");
         assert!(
             assurance.is_assured(),
             "{plant:?} from {from:?} to {band:?}, wish {wish}, at {t}: {assurance:?}"
         );
         assert!((low..=high).contains(&u[0]), "{u:?}");
         for part in 1..=10_u32 {
-            x = rk4_step(&plant, &x, &SVector::from(u), period / 10.0);
+            x = rk4_step(&plant, &x, &u, period / 10.0);
             let now = t + f64::from(part) * period / 10.0;
             let away = (x[0] - band.0).abs() - band.1;
             // An integrator of our own beside that of the plan.
@@ -1854,12 +1850,12 @@ fn a_plant_that_rests_elsewhere_is_promised() {
 struct Pendulum;
 
 impl ControlAffine<2, 1> for Pendulum {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-        SVector::from([x[1], x[0].sin() * -9.81])
+    fn drift<S: Scalar>(&self, x: &[S; 2]) -> [S; 2] {
+        [x[1], x[0].sin() * -9.81]
     }
 
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
-        SMatrix::from([[S::zero(), S::one()]])
+    fn input_map<S: Scalar>(&self, _x: &[S; 2]) -> [[S; 1]; 2] {
+        [[S::zero()], [S::one()]]
     }
 }
 
@@ -1868,12 +1864,12 @@ impl ControlAffine<2, 1> for Pendulum {
 struct Magnet;
 
 impl ControlAffine<2, 1> for Magnet {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-        SVector::from([x[1], S::from(9.81)])
+    fn drift<S: Scalar>(&self, x: &[S; 2]) -> [S; 2] {
+        [x[1], S::from(9.81)]
     }
 
-    fn input_map<S: Scalar>(&self, x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
-        SMatrix::from([[S::zero(), -(S::one() / x[0].squared())]])
+    fn input_map<S: Scalar>(&self, x: &[S; 2]) -> [[S; 1]; 2] {
+        [[S::zero()], [-(S::one() / x[0].squared())]]
     }
 }
 
@@ -1882,12 +1878,12 @@ impl ControlAffine<2, 1> for Magnet {
 struct Harvest(f64);
 
 impl ControlAffine<1, 1> for Harvest {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
-        SVector::from([x[0] * (-x[0] + self.0)])
+    fn drift<S: Scalar>(&self, x: &[S; 1]) -> [S; 1] {
+        [x[0] * (-x[0] + self.0)]
     }
 
-    fn input_map<S: Scalar>(&self, x: &SVector<S, 1>) -> SMatrix<S, 1, 1> {
-        SMatrix::from([[-x[0]]])
+    fn input_map<S: Scalar>(&self, x: &[S; 1]) -> [[S; 1]; 1] {
+        [[-x[0]]]
     }
 }
 
@@ -1940,7 +1936,7 @@ fn no_plan_lets_a_tank_run_dry() {
             assert!(assurance.is_assured(), "{round}, at {t}, {x}: {assurance:?}");
             for _ in 0..200 {
                 // Not-a-number is empty.
-                x = rk4_step(&Tank(rate), &[x].into(), &u.into(), period / 200.0)[0].max(0.0);
+                x = rk4_step(&Tank(rate), &[x], &u, period / 200.0)[0].max(0.0);
             }
             assert!(x <= limit, "{round}, at {t}: {x}");
         }
@@ -2000,20 +1996,20 @@ fn leaves_the_edge<const N: usize>(random: &mut Random, draws: usize) -> u32 {
             .and_then(FilterBuilder::build)
             .expect("valid filter");
         let mut filter = filter.with_plans(period).expect("plans");
-        let mut x = SVector::<f64, N>::zeros();
+        let mut x = [0.0; N];
         x[0] = inside;
         for k in 0..40 {
             let wish = [0.0, -3.0 * most, random.between(-2.0, 2.0) * most][round % 3];
             let (t, mut u) = (f64::from(k) * period, [0.0]);
             let assurance =
-                filter.step(t, x.as_slice(), &[wish], &mut u).expect("dimensions").assurance.expect("plans");
+                filter.step(t, &x, &[wish], &mut u).expect("dimensions").assurance.expect("plans");
             if k == 0 && !assurance.is_assured() {
                 break;
             }
             assured += u32::from(k == 0);
             assert!(assurance.is_assured(), "{N}, {round}, {inside} inside, at {t}: {assurance:?}");
             for _ in 0..8 {
-                x = rk4_step(&Integrator::<N>, &x, &u.into(), period / 8.0);
+                x = rk4_step(&Integrator::<N>, &x, &u, period / 8.0);
                 assert!(x[0] >= -1e-12, "{N}, {round}, at {t}: {x:?}");
             }
         }
@@ -2080,17 +2076,14 @@ fn a_hard_turn_is_found() {
             .and_then(FilterBuilder::build)
             .expect("valid filter");
         let mut filter = filter.with_plans(PERIOD).expect("plans");
-        let mut x = SVector::from([0.0, 0.0, -3.0058, 3.4187]);
+        let mut x = [0.0, 0.0, -3.0058, 3.4187];
         for k in 0..((deadline + 1.0) / PERIOD) as usize {
             let (t, mut u) = (k as f64 * PERIOD, [0.0; 2]);
-            let assurance = filter
-                .step(t, x.as_slice(), &[0.0; 2], &mut u)
-                .expect("right dimensions")
-                .assurance
-                .expect("plans");
+            let assurance =
+                filter.step(t, &x, &[0.0; 2], &mut u).expect("right dimensions").assurance.expect("plans");
             assert!(assurance.is_assured(), "{factor} at {t}: {assurance:?}");
             for part in 1..=10 {
-                x = rk4_step(&plant, &x, &SVector::from(u), PERIOD / 10.0);
+                x = rk4_step(&plant, &x, &u, PERIOD / 10.0);
                 let is_due = t + f64::from(part) * PERIOD / 10.0 >= deadline;
                 assert!(
                     !is_due || (x[0] - centre[0]).hypot(x[1] - centre[1]) <= radius,
@@ -2152,7 +2145,7 @@ enum Thing {
 }
 
 impl Barrier<4> for Way {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 4>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; 4]) -> S {
         let way = -(x[1].squared() + 0.01).sqrt() + 3.0;
         self.things.iter().fold(way, |h, &[at, beside, size]| {
             let along = (x[0] - at).squared();
@@ -2224,7 +2217,7 @@ fn small_things_on_a_long_way_are_seen() {
             let after = |s: f64, i: usize| x[i] + x[i + 2] * s + u[i] * s * s / 2.0;
             for part in 1..=100 {
                 let s = 0.05 * f64::from(part) / 100.0;
-                let h = way.value(0.0, &[after(s, 0), after(s, 1), 0.0, 0.0].into());
+                let h = way.value(0.0, &[after(s, 0), after(s, 1), 0.0, 0.0]);
                 assert!(h >= 0.0, "seed {seed}, {s} s after {t} s: {h}, {way:?}");
             }
             x = [after(0.05, 0), after(0.05, 1), x[2] + u[0] * 0.05, x[3] + u[1] * 0.05];
@@ -2240,13 +2233,13 @@ fn small_things_on_a_long_way_are_seen() {
 struct Windy([f64; 3]);
 
 impl ControlAffine<2, 1> for Windy {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+    fn drift<S: Scalar>(&self, x: &[S; 2]) -> [S; 2] {
         let Self([at, width, force]) = *self;
-        SVector::from([x[1], -((-((x[0] - at) / width).squared()).exp() * force)])
+        [x[1], -((-((x[0] - at) / width).squared()).exp() * force)]
     }
 
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
-        SMatrix::from([[S::zero(), S::one()]])
+    fn input_map<S: Scalar>(&self, _x: &[S; 2]) -> [[S; 1]; 2] {
+        [[S::zero()], [S::one()]]
     }
 }
 
@@ -2271,17 +2264,13 @@ fn a_wind_on_a_short_stretch_is_seen_wherever_it_blows() {
             .and_then(FilterBuilder::build)
             .expect("valid filter");
         let mut filter = filter.with_plans(PERIOD).expect("a filter that can be assured");
-        let mut x = SVector::from([0.0, random.between(8.0, 16.0)]);
+        let mut x = [0.0, random.between(8.0, 16.0)];
         let (mut k, mut refused) = (0, false);
         while PERIOD * f64::from(k) < deadline && !refused {
             let (t, u_ref) = (PERIOD * f64::from(k), [0.0, 0.3, -x[1]][seed as usize % 3]);
             let mut u = [0.0];
-            let standing = filter
-                .step(t, x.as_slice(), &[u_ref], &mut u)
-                .expect("dimensions")
-                .assurance
-                .expect("plans")
-                .standing;
+            let standing =
+                filter.step(t, &x, &[u_ref], &mut u).expect("dimensions").assurance.expect("plans").standing;
             refused = k == 0 && standing == Standing::Refused;
             assert!(
                 refused || standing == Standing::Assured,
@@ -2289,7 +2278,7 @@ fn a_wind_on_a_short_stretch_is_seen_wherever_it_blows() {
             );
             // Some steps on the width of any wind.
             for _ in 0..200 {
-                x = rk4_step(&plant, &x, &u.into(), PERIOD / 200.0);
+                x = rk4_step(&plant, &x, &u, PERIOD / 200.0);
             }
             k += 1;
         }
@@ -2310,7 +2299,7 @@ enum Odd {
 }
 
 impl Barrier<2> for Odd {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 2>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; 2]) -> S {
         match *self {
             Self::Angle => x[0].atan2(S::from(-3.0)) + 2.0,
             Self::Power(exponent) => -(x[0] / 5.0).powf(exponent) + 1.0,
@@ -2350,7 +2339,7 @@ fn jumps_and_powers_of_negative_numbers_are_seen() {
             assured += u32::from(k == 0);
             for part in 1..=200 {
                 let s = PERIOD * f64::from(part) / 200.0;
-                let h = odd.value(0.0, &[x[0] + s * x[1] + s * s / 2.0 * u[0], 0.0].into());
+                let h = odd.value(0.0, &[x[0] + s * x[1] + s * s / 2.0 * u[0], 0.0]);
                 assert!(h >= -1e-12, "{odd:?}, {s} s after {t} s: {h}");
             }
             x = [x[0] + PERIOD * x[1] + PERIOD * PERIOD / 2.0 * u[0], x[1] + PERIOD * u[0]];
@@ -2364,12 +2353,12 @@ fn jumps_and_powers_of_negative_numbers_are_seen() {
 struct Lifted(f64);
 
 impl ControlAffine<2, 2> for Lifted {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-        SVector::from([S::zero(), (-((x[0] - self.0) / 0.002).squared()).exp() * 3.0])
+    fn drift<S: Scalar>(&self, x: &[S; 2]) -> [S; 2] {
+        [S::zero(), (-((x[0] - self.0) / 0.002).squared()).exp() * 3.0]
     }
 
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 2> {
-        SMatrix::identity()
+    fn input_map<S: Scalar>(&self, _x: &[S; 2]) -> [[S; 2]; 2] {
+        [[S::one(), S::zero()], [S::zero(), S::one()]]
     }
 }
 
@@ -2390,23 +2379,19 @@ fn small_things_are_seen_far_from_the_origin() {
             .and_then(FilterBuilder::build)
             .expect("valid filter");
         let mut filter = filter.with_plans(PERIOD).expect("a filter that can be assured");
-        let mut x = SVector::from([far, far]);
+        let mut x = [far, far];
         for k in 0..50 {
             let (t, mut u) = (PERIOD * f64::from(k), [0.0; 2]);
             let u_ref = [[0.0; 2], [1.0, 0.01]][round % 2];
-            let standing = filter
-                .step(t, x.as_slice(), &u_ref, &mut u)
-                .expect("dimensions")
-                .assurance
-                .expect("plans")
-                .standing;
+            let standing =
+                filter.step(t, &x, &u_ref, &mut u).expect("dimensions").assurance.expect("plans").standing;
             if standing == Standing::Refused {
                 break;
             }
             assert_eq!(standing, Standing::Assured, "{far} at {t} s: {x:?}");
             assured += 1;
             for _ in 0..400 {
-                x = rk4_step(&plant, &x, &u.into(), PERIOD / 400.0);
+                x = rk4_step(&plant, &x, &u, PERIOD / 400.0);
                 // Round-off of the place, 400 times a period.
                 assert!(x[1] <= far + 0.003 + 1e-6, "{far}, {t} s: {x:?}");
             }
@@ -2502,12 +2487,12 @@ fn armed_again_when_all_is_over_it_follows_no_plan() {
 struct Filling(f64);
 
 impl ControlAffine<2, 1> for Filling {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-        SVector::from([x[0] * -0.5, x[0].max(S::zero()) - (x[1] - 60.0) * self.0])
+    fn drift<S: Scalar>(&self, x: &[S; 2]) -> [S; 2] {
+        [x[0] * -0.5, x[0].max(S::zero()) - (x[1] - 60.0) * self.0]
     }
 
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
-        SMatrix::from([[S::one(), S::zero()]])
+    fn input_map<S: Scalar>(&self, _x: &[S; 2]) -> [[S; 1]; 2] {
+        [[S::one()], [S::zero()]]
     }
 }
 
@@ -2536,27 +2521,23 @@ fn what_creeps_on_is_no_rest() {
         let creeps = round < 3 || round % 4 != 0;
         let mut plant = Filling(if creeps { 10.0_f64.powf(random.between(-8.0, -3.0)) } else { 0.0 });
         let mut limit = random.between(5.0, 80.0);
-        let mut x = SVector::from([random.between(0.0, 4.0), random.between(0.0, 60.0)]);
+        let mut x = [random.between(0.0, 4.0), random.between(0.0, 60.0)];
         if round < 3 {
             // Lost after 116 s where a creep as slow as this counts as rest.
             (plant, limit) = (Filling(7.986_311_018_272_636e-8), 31.088_444_160_762_222);
-            x = SVector::from([3.071_511_322_579_002, 26.137_458_198_334_933]);
+            x = [3.071_511_322_579_002, 26.137_458_198_334_933];
         }
         let mut filter = level_kept(plant, limit);
         for k in 0..1300 {
             let (t, u_ref, mut u) = (0.1 * f64::from(k), [0.0, 2.0, -x[0]][round % 3], [0.0]);
-            let standing = filter
-                .step(t, x.as_slice(), &[u_ref], &mut u)
-                .expect("dimensions")
-                .assurance
-                .expect("plans")
-                .standing;
+            let standing =
+                filter.step(t, &x, &[u_ref], &mut u).expect("dimensions").assurance.expect("plans").standing;
             if k == 0 && standing == Standing::Refused {
                 break;
             }
             assured[usize::from(creeps)] += u32::from(k == 0);
             assert_eq!(standing, Standing::Assured, "{plant:?} at {t} s: {x:?}");
-            x = rk4_step(&plant, &x, &u.into(), 0.1);
+            x = rk4_step(&plant, &x, &u, 0.1);
         }
     }
     println!("{assured:?} are assured at rest and creeping");
@@ -2572,16 +2553,12 @@ struct Hiding {
 }
 
 impl ControlAffine<3, 1> for Hiding {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
-        SVector::from([
-            x[0] * -0.5,
-            x[0].max(S::zero()) + self.creep + x[2] * self.part,
-            x[0] - x[2] * self.decay,
-        ])
+    fn drift<S: Scalar>(&self, x: &[S; 3]) -> [S; 3] {
+        [x[0] * -0.5, x[0].max(S::zero()) + self.creep + x[2] * self.part, x[0] - x[2] * self.decay]
     }
 
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 3>) -> SMatrix<S, 3, 1> {
-        SMatrix::from([[S::one(), S::zero(), S::zero()]])
+    fn input_map<S: Scalar>(&self, _x: &[S; 3]) -> [[S; 1]; 3] {
+        [[S::one()], [S::zero()], [S::zero()]]
     }
 }
 
@@ -2603,16 +2580,12 @@ fn a_rest_that_decays_slowly_stays_one() {
     }
     let mut assured = 0;
     for (round, (plant, speed, limit)) in cases.into_iter().enumerate() {
-        let mut x = SVector::from([speed, 0.0, 0.0]);
+        let mut x = [speed, 0.0, 0.0];
         let mut filter = level_kept(plant, limit);
         for k in 0..4000 {
             let (t, u_ref, mut u) = (0.1 * f64::from(k), [0.0, 2.0, -x[0]][round % 3], [0.0]);
-            let standing = filter
-                .step(t, x.as_slice(), &[u_ref], &mut u)
-                .expect("dimensions")
-                .assurance
-                .expect("plans")
-                .standing;
+            let standing =
+                filter.step(t, &x, &[u_ref], &mut u).expect("dimensions").assurance.expect("plans").standing;
             if k == 0 && standing == Standing::Refused {
                 break;
             }
@@ -2622,7 +2595,7 @@ fn a_rest_that_decays_slowly_stays_one() {
                 Standing::Assured,
                 "{plant:?} from {speed} m/s to {limit} m at {t} s: {x:?}"
             );
-            x = rk4_step(&plant, &x, &u.into(), 0.1);
+            x = rk4_step(&plant, &x, &u, 0.1);
             assert!(x[1] <= limit, "{plant:?} at {t} s: {x:?}");
         }
     }
@@ -2639,13 +2612,13 @@ struct Warming {
 }
 
 impl ControlAffine<3, 1> for Warming {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+    fn drift<S: Scalar>(&self, x: &[S; 3]) -> [S; 3] {
         let warms = (-x[2] + self.towards) * self.rate + (-x[2]).max(S::zero()) * 5.0;
-        SVector::from([x[1], (-(x[2] - 0.6).abs() + 0.2).max(S::zero()) * self.push, warms])
+        [x[1], (-(x[2] - 0.6).abs() + 0.2).max(S::zero()) * self.push, warms]
     }
 
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 3>) -> SMatrix<S, 3, 1> {
-        SMatrix::from([[S::zero(), S::one(), S::zero()]])
+    fn input_map<S: Scalar>(&self, _x: &[S; 3]) -> [[S; 1]; 3] {
+        [[S::zero()], [S::one()], [S::zero()]]
     }
 }
 
@@ -2657,7 +2630,7 @@ struct Cool {
 }
 
 impl Barrier<3> for Cool {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 3>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; 3]) -> S {
         let near = -((x[0] - 2.0).squared() + 1e-4).sqrt() + 0.2;
         match self.is_smooth {
             true => near - (((x[2] - self.edge) * 60.0).tanh() + 1.0) * 0.3,
@@ -2674,13 +2647,13 @@ struct Unstable {
 }
 
 impl ControlAffine<4, 1> for Unstable {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
+    fn drift<S: Scalar>(&self, x: &[S; 4]) -> [S; 4] {
         let push = (-(x[3] - 0.6).abs() + 0.2).max(S::zero()) * 20.0;
-        SVector::from([x[1], push, -x[2] * 5.0, x[3] * self.rate + x[2]])
+        [x[1], push, -x[2] * 5.0, x[3] * self.rate + x[2]]
     }
 
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 4>) -> SMatrix<S, 4, 1> {
-        SMatrix::from([[S::zero(), S::one(), S::zero(), S::zero()]])
+    fn input_map<S: Scalar>(&self, _x: &[S; 4]) -> [[S; 1]; 4] {
+        [[S::zero()], [S::one()], [S::zero()], [S::zero()]]
     }
 }
 
@@ -2688,7 +2661,7 @@ impl ControlAffine<4, 1> for Unstable {
 struct Near;
 
 impl Barrier<4> for Near {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 4>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; 4]) -> S {
         -((x[0] - 2.0).squared() + 1e-4).sqrt() + 0.2
     }
 }
@@ -2729,12 +2702,12 @@ struct Driven {
 }
 
 impl ControlAffine<2, 1> for Driven {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-        SVector::from([x[1], x[0] * self.stiffness])
+    fn drift<S: Scalar>(&self, x: &[S; 2]) -> [S; 2] {
+        [x[1], x[0] * self.stiffness]
     }
 
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
-        SMatrix::from([[S::zero(), S::one()]])
+    fn input_map<S: Scalar>(&self, _x: &[S; 2]) -> [[S; 1]; 2] {
+        [[S::zero()], [S::one()]]
     }
 }
 
@@ -2742,7 +2715,7 @@ impl ControlAffine<2, 1> for Driven {
 struct Within(f64);
 
 impl Barrier<2> for Within {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 2>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; 2]) -> S {
         -x[0].abs() + self.0
     }
 }
@@ -2790,12 +2763,12 @@ struct Lagging {
 }
 
 impl ControlAffine<2, 1> for Lagging {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-        SVector::from([x[1], -x[1] / self.lag])
+    fn drift<S: Scalar>(&self, x: &[S; 2]) -> [S; 2] {
+        [x[1], -x[1] / self.lag]
     }
 
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
-        SMatrix::from([[S::zero(), S::from(1.0 / self.lag)]])
+    fn input_map<S: Scalar>(&self, _x: &[S; 2]) -> [[S; 1]; 2] {
+        [[S::zero()], [S::from(1.0 / self.lag)]]
     }
 }
 

@@ -3,9 +3,9 @@
 mod enumeration;
 mod quadratic;
 
+use nalgebra::DVector;
 use proptest::prelude::*;
 use punctual_core::MAX_ROWS;
-use punctual_core::nalgebra::DVector;
 use punctual_core::qp::{
     Active, Backend, Bounds, Constraint, Enforcement, Outcome, Problem, Row, Solver, Workspace, solve,
 };

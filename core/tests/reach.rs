@@ -3,17 +3,18 @@
 
 mod draw;
 
+use std::array::from_fn;
+
 use punctual_core::barriers::{DistanceDisc, HalfPlane, Rectangle};
 use punctual_core::dynamics::{ControlAffine, chain, rk4_step};
 use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Infeasible, Phase, ProfileKind};
-use punctual_core::nalgebra::{SMatrix, SVector};
+use punctual_core::plants::{
+    Bicycle, KinematicBicycle, PointMass, SmallSlipBicycle, SmallSlipBicycleWithRate, Unicycle,
+};
 use punctual_core::qp::Bounds;
 use punctual_core::scalar::Scalar;
 use punctual_core::{barrier::Barrier, lie, reach};
 use punctual_reference::effort::smallest;
-use punctual_reference::plants::{
-    Bicycle, KinematicBicycle, PointMass, SmallSlipBicycle, SmallSlipBicycleWithRate, Unicycle,
-};
 use punctual_reference::simulation::{Schedule, closed_loop};
 
 /// A point whose velocity is the input.
@@ -21,15 +22,15 @@ use punctual_reference::simulation::{Schedule, closed_loop};
 struct Kinematic;
 
 impl ControlAffine<2, 2> for Kinematic {
-    fn drift<S: Scalar>(&self, _x: &SVector<S, 2>) -> SVector<S, 2> {
-        SVector::zeros()
+    fn drift<S: Scalar>(&self, _x: &[S; 2]) -> [S; 2] {
+        [S::zero(); 2]
     }
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 2> {
-        SMatrix::identity()
+    fn input_map<S: Scalar>(&self, _x: &[S; 2]) -> [[S; 2]; 2] {
+        [[S::one(), S::zero()], [S::zero(), S::one()]]
     }
     fn region(
         &self,
-        x: &SVector<f64, 2>,
+        x: &[f64; 2],
         bounds: [&[f64]; 2],
         time: [f64; 2],
     ) -> Option<punctual_core::dynamics::Region> {
@@ -86,7 +87,7 @@ where
 {
     let mut draw = draw::Draw::new(seed);
     for _ in 0..40 {
-        let x0 = SVector::<f64, NX>::from_fn(|i, _| draw.uniform(-1.0, 1.0) * [8.0, 8.0, 3.0, 3.0, 0.4][i]);
+        let x0 = from_fn::<f64, NX, _>(|i| draw.uniform(-1.0, 1.0) * [8.0, 8.0, 3.0, 3.0, 0.4][i]);
         let disc = DistanceDisc::new([draw.uniform(-9.0, 9.0), 3.0], 2.0, 2.0)
             .and_then(|d| d.moving([draw.uniform(-1.0, 1.0), 0.5]))
             .expect("valid");
@@ -98,10 +99,10 @@ where
         let soonest = reach::soonest(&*source, (0.0, x0.as_slice()), &within, 20.0).expect("known");
         for _ in 0..20 {
             let (mut x, mut t) = (x0, 0.0);
-            let mut u = SVector::<f64, 2>::zeros();
+            let mut u = [0.0; 2];
             while t < 10.0 {
                 if draw.uniform(0.0, 1.0) < 0.1 {
-                    u = SVector::from_fn(|i, _| limits[i] * draw.uniform(-2.0, 2.0).clamp(-1.0, 1.0));
+                    u = from_fn(|i| limits[i] * draw.uniform(-2.0, 2.0).clamp(-1.0, 1.0));
                 }
                 if disc.value(t, &x) >= 0.0 {
                     assert!(t >= soonest, "{t} before {soonest} from {x0:?}");
@@ -170,10 +171,10 @@ fn a_deadline_out_of_reach_is_postponed_and_kept() {
         };
         let mut filter = filter(settings, 2.0);
         let schedule = Schedule { step: 0.01, steps: 1500, substeps: 1 };
-        let x0 = SVector::from([0.0; 4]);
+        let x0 = [0.0; 4];
         let mut arrival = None;
         let mut last = None;
-        let coast = |_: f64, _: &SVector<f64, 4>| SVector::<f64, 2>::zeros();
+        let coast = |_: f64, _: &[f64; 4]| [0.0; 2];
         closed_loop(&mut filter, &PointMass, x0, schedule, coast, |t, _, u, report| {
             let b = report.barriers[0];
             if t == 0.0 {
@@ -205,8 +206,8 @@ fn low_peaks_need_smaller_bounds() {
             let mut filter = filter(settings, limit);
             let schedule = Schedule { step: 0.01, steps: 600, substeps: 1 };
             let mut kept = true;
-            let coast = |_: f64, _: &SVector<f64, 4>| SVector::<f64, 2>::zeros();
-            closed_loop(&mut filter, &PointMass, [0.0; 4].into(), schedule, coast, |t, _, _, report| {
+            let coast = |_: f64, _: &[f64; 4]| [0.0; 2];
+            closed_loop(&mut filter, &PointMass, [0.0; 4], schedule, coast, |t, _, _, report| {
                 kept &= t < 2.999 || report.barriers[0].h >= 0.0;
                 kept &= report.status.is_satisfied();
             })?;

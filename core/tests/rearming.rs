@@ -8,8 +8,7 @@ use punctual_core::convergence::{FixedTime, FixedTimeState};
 use punctual_core::dynamics::rk4_step;
 use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Method, Phase, Sampling};
 use punctual_core::lie;
-use punctual_core::nalgebra::{SVector, vector};
-use punctual_reference::plants::Unicycle;
+use punctual_core::plants::Unicycle;
 use punctual_reference::simulation::{Schedule, closed_loop};
 use scenario::{Integrator, NonNegative, distance_disc, goal, speed_damping};
 
@@ -20,8 +19,8 @@ fn leaving_rearms_with_the_recovery_time() {
     let recovery = 1.5;
     let settings = BarrierSettings { recovery: Some(recovery), margin: 0.05, ..BarrierSettings::within(3.0) };
     let mut filter = goal(settings);
-    let mut x = vector![44.0, 45.0, 0.0, 0.0];
-    let (mut u, step) = (SVector::<f64, 2>::zeros(), 0.01);
+    let mut x = [44.0, 45.0, 0.0, 0.0];
+    let (mut u, step) = ([0.0; 2], 0.01);
     for k in 0..1000_u32 {
         let t = f64::from(k) * step;
         let gusts = k / 300;
@@ -29,7 +28,7 @@ fn leaving_rearms_with_the_recovery_time() {
             x[0] -= 6.0;
         }
         let u_ref = [-x[2], -x[3]];
-        let b = filter.step(t, x.as_slice(), &u_ref, u.as_mut_slice()).expect("right dimensions").barriers[0];
+        let b = filter.step(t, &x, &u_ref, &mut u).expect("right dimensions").barriers[0];
         let since = t - f64::from(300 * gusts) * step;
         // The sample that shows it outside breaks the old promise; the new one is given at the next.
         assert_eq!((b.recoveries, b.on_course), (gusts, gusts == 0 || since > 0.0), "at {t}");
@@ -37,7 +36,7 @@ fn leaving_rearms_with_the_recovery_time() {
             assert!((b.time_left - (recovery - since)).abs() < 1e-9, "at {t}");
         }
         assert!(gusts == 0 || since < recovery || b.h >= 0.0, "h = {} at {t}", b.h);
-        x = rk4_step(&punctual_reference::plants::PointMass, &x, &u, step);
+        x = rk4_step(&punctual_core::plants::PointMass, &x, &u, step);
     }
 }
 
@@ -113,7 +112,7 @@ fn short_deadline<const N: usize>(step: f64, deadline: f64) {
         .and_then(FilterBuilder::build)
         .expect("valid filter");
     let schedule = Schedule { step, steps: 100, substeps: 1 };
-    let mut x0 = SVector::<f64, N>::zeros();
+    let mut x0 = [0.0; N];
     x0[0] = -3.0;
     let (mut first, mut least) = (None, 0.0_f64);
     closed_loop(
@@ -121,7 +120,7 @@ fn short_deadline<const N: usize>(step: f64, deadline: f64) {
         &Integrator::<N>,
         x0,
         schedule,
-        |_, _| vector![0.0],
+        |_, _| [0.0],
         |t, x, _, r| {
             assert!(r.status.is_satisfied(), "{N}: {r:?} at {t}");
             if x[0] >= 0.0 {
@@ -160,9 +159,9 @@ fn a_start_inside() {
         closed_loop(
             &mut filter,
             &Integrator::<2>,
-            x0.into(),
+            x0,
             schedule,
-            |_, _| vector![-1.0],
+            |_, _| [-1.0],
             |t, x, _, r| {
                 let b = r.barriers[0];
                 assert_eq!((b.phase, b.arrival_time), (Phase::Stay, Some(0.0)), "at {t}: {b:?}");
@@ -184,8 +183,8 @@ fn a_start_inside() {
 fn a_new_deadline_on_the_way() {
     for (changed_at, deadline) in [(2.0, 3.5), (2.0, 9.0), (4.9, 2.0)] {
         let mut filter = goal(BarrierSettings::within(5.0));
-        let mut x = vector![0.0, 0.0, 1.0, 0.0];
-        let (mut u, step) = (SVector::<f64, 2>::zeros(), 0.01);
+        let mut x = [0.0, 0.0, 1.0, 0.0];
+        let (mut u, step) = ([0.0; 2], 0.01);
         let end = changed_at + deadline;
         for k in 0..1500_u32 {
             let t = f64::from(k) * step;
@@ -193,14 +192,13 @@ fn a_new_deadline_on_the_way() {
                 filter.set_deadline(0, deadline).expect("a barrier and a deadline");
             }
             let u_ref = [-x[2], -x[3]];
-            let b =
-                filter.step(t, x.as_slice(), &u_ref, u.as_mut_slice()).expect("right dimensions").barriers[0];
+            let b = filter.step(t, &x, &u_ref, &mut u).expect("right dimensions").barriers[0];
             assert!(b.on_course, "at {t}: {b:?}");
             if t >= changed_at && b.phase == Phase::Approach {
                 assert!((b.time_left - (end - t)).abs() < 1e-9, "at {t}");
             }
             assert!(t < end || b.h >= 0.0, "{deadline}: h = {} at {t}", b.h);
-            x = rk4_step(&punctual_reference::plants::PointMass, &x, &u, step);
+            x = rk4_step(&punctual_core::plants::PointMass, &x, &u, step);
         }
     }
     let mut filter = goal(BarrierSettings::within(5.0));
@@ -213,26 +211,26 @@ fn a_new_deadline_on_the_way() {
 #[test]
 fn a_moved_set_on_the_way() {
     let mut filter = goal(BarrierSettings { margin: 0.02, ..BarrierSettings::within(5.0) });
-    let mut x = vector![0.0, 0.0, 1.0, 0.0];
-    let (mut u, step, moved_at) = (SVector::<f64, 2>::zeros(), 0.01, 6.0);
+    let mut x = [0.0, 0.0, 1.0, 0.0];
+    let (mut u, step, moved_at) = ([0.0; 2], 0.01, 6.0);
     for k in 0..1500_u32 {
         let t = f64::from(k) * step;
         if (t - moved_at).abs() < 1e-9 {
             let disc = DistanceDisc::new([20.0, 60.0], 2.0, 2.0).expect("valid disc");
-            let source = lie::along(punctual_reference::plants::PointMass, disc, 2).expect("in range");
+            let source = lie::along(punctual_core::plants::PointMass, disc, 2).expect("in range");
             filter.set_source(0, source).expect("the same dimensions");
         }
         let u_ref = [-x[2], -x[3]];
-        let b = filter.step(t, x.as_slice(), &u_ref, u.as_mut_slice()).expect("right dimensions").barriers[0];
+        let b = filter.step(t, &x, &u_ref, &mut u).expect("right dimensions").barriers[0];
         assert!(b.on_course, "at {t}: {b:?}");
         let promised = (5.0..moved_at - 1e-9).contains(&t) || t >= moved_at + 5.0;
         assert!(!promised || b.h >= 0.0, "h = {} at {t}", b.h);
-        x = rk4_step(&punctual_reference::plants::PointMass, &x, &u, step);
+        x = rk4_step(&punctual_core::plants::PointMass, &x, &u, step);
     }
     let other = lie::along(Integrator::<2>, NonNegative, 2).expect("in range");
     let refused = filter.set_source(0, other).expect_err("refused");
     assert_eq!(refused.to_string(), "goal.x: has 2 components, must have 4");
-    let other = lie::along(punctual_reference::plants::PointMass, distance_disc(), 1).expect("in range");
+    let other = lie::along(punctual_core::plants::PointMass, distance_disc(), 1).expect("in range");
     let refused = filter.set_source(0, other).expect_err("refused");
     assert_eq!(refused.to_string(), "goal.relative_degree: is 1, must stay 2");
 }
@@ -269,14 +267,13 @@ fn jacobi(step: f64, x0: [f64; 4]) -> (Option<f64>, f64, usize) {
         .and_then(|b| b.actuation_delay(step))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
-    let (mut x, mut acting) = (SVector::from(x0), SVector::<f64, 2>::zeros());
+    let (mut x, mut acting) = (x0, [0.0; 2]);
     let (mut arrival, mut least, mut unmet) = (None, f64::INFINITY, 0);
     for k in 0..=(10.0 / step).round() as usize {
         let t = k as f64 * step;
-        let mut u = SVector::<f64, 2>::zeros();
+        let mut u = [0.0; 2];
         let u_ref = speed_damping(t, &x);
-        let report =
-            filter.step(t, x.as_slice(), u_ref.as_slice(), u.as_mut_slice()).expect("right dimensions");
+        let report = filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
         let h = report.barriers[0].h;
         if h >= 0.0 && arrival.is_none() {
             arrival = Some(t);

@@ -11,9 +11,8 @@ use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::elementary::powf;
 use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Sampling, Status};
 use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives};
-use punctual_core::nalgebra::{SMatrix, SVector, vector};
+use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 use punctual_core::scalar::Scalar;
-use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
 use punctual_reference::simulation::{Schedule, closed_loop};
 use scenario::{Integrator, NonNegative, damping, distance_disc, speed_damping};
 use support::Reduced;
@@ -52,14 +51,15 @@ fn predictions_follow_the_flow() {
     let (x, u, period) = ([10.0, 20.0, 0.4, 6.0], [3.0, -0.7], 0.05);
     let mut ahead = Ahead::ZERO;
     model.ahead(1.0, &x, &u, period, &mut ahead);
-    let mut exact = SVector::from(x);
+    let mut exact = x;
     for _ in 0..100 {
-        exact = rk4_step(&bicycle(), &exact, &SVector::from(u), period / 100.0);
+        exact = rk4_step(&bicycle(), &exact, &u, period / 100.0);
     }
     let mut predicted = x;
     model.flow(&mut predicted, &u, period);
     // Two steps of a fourth-order method of 25 ms, rates of order 1/s: 2 · 0.025⁵ ≈ 2e-8 of 50 m.
-    assert!((SVector::from(predicted) - exact).norm() < 1e-6);
+    let off = (0..4).map(|i| (predicted[i] - exact[i]).powi(2)).sum::<f64>();
+    assert!(off.sqrt() < 1e-6);
     let mut there = Derivatives::ZERO;
     source.evaluate(1.05, &predicted, &mut there);
     assert!((ahead.value[0] - there.drift[0]).abs() < 1e-12);
@@ -87,12 +87,12 @@ fn predictions_follow_the_flow() {
 struct Decay(f64);
 
 impl ControlAffine<1, 1> for Decay {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
-        vector![-x[0] * self.0]
+    fn drift<S: Scalar>(&self, x: &[S; 1]) -> [S; 1] {
+        [-x[0] * self.0]
     }
 
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 1>) -> SMatrix<S, 1, 1> {
-        SMatrix::from_element(S::one())
+    fn input_map<S: Scalar>(&self, _x: &[S; 1]) -> [[S; 1]; 1] {
+        [[S::one()]]
     }
 }
 
@@ -153,9 +153,9 @@ fn psi_never_falls_faster<const N: usize>(period: f64) {
         .and_then(|b| b.sampling(Sampling::Period(period)))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
-    let mut x0 = SVector::<f64, N>::zeros();
+    let mut x0 = [0.0; N];
     x0[0] = -1.0;
-    let psi = |x: &SVector<f64, N>| -> f64 {
+    let psi = |x: &[f64; N]| -> f64 {
         (0..N)
             .map(|k| {
                 binomial(N - 1, k) * rate.powi((N - 1 - k) as i32) * (x[k] - if k == 0 { 0.05 } else { 0.0 })
@@ -170,7 +170,7 @@ fn psi_never_falls_faster<const N: usize>(period: f64) {
         &Integrator::<N>,
         x0,
         schedule,
-        |_, _| vector![0.0],
+        |_, _| [0.0],
         |t, x, _, report| {
             assert!(report.predicted && report.status.is_satisfied(), "n {N} at {t}: {:?}", report.status);
             if t >= 4.0 {
@@ -202,7 +202,7 @@ fn the_sampled_constraint_holds_at_every_sample() {
 /// Arrival and least h after the deadline.
 fn run<P>(
     plant: &P,
-    nominal: fn(f64, &SVector<f64, 4>) -> SVector<f64, 2>,
+    nominal: fn(f64, &[f64; 4]) -> [f64; 2],
     sampling: Sampling,
     step: f64,
     x0: [f64; 4],
@@ -213,7 +213,7 @@ where
     let mut filter = filter(plant.clone(), sampling);
     let (mut arrival, mut least) = (None, f64::INFINITY);
     let schedule = Schedule { step, steps: (2.0 * DEADLINE / step).round() as usize, substeps: 4 };
-    closed_loop(&mut filter, plant, x0.into(), schedule, nominal, |t, _, _, report| {
+    closed_loop(&mut filter, plant, x0, schedule, nominal, |t, _, _, report| {
         arrival = report.barriers[0].arrival_time;
         if t > DEADLINE - step / 2.0 {
             least = least.min(report.barriers[0].h);
@@ -251,7 +251,7 @@ fn a_margin_that_is_used_up_is_no_guarantee() {
         let mut filter = filter(Unicycle, sampling);
         let (mut claimed_below, mut lost) = (0, 0);
         let schedule = Schedule { step: 0.05, steps: 99, substeps: 4 };
-        closed_loop(&mut filter, &Unicycle, HARD[0].into(), schedule, speed_damping, |_, _, _, r| {
+        closed_loop(&mut filter, &Unicycle, HARD[0], schedule, speed_damping, |_, _, _, r| {
             let b = &r.barriers[0];
             // The profile is reported with the margin.
             let below = b.h < b.profile - 0.02 - 1e-9;
@@ -273,17 +273,10 @@ fn the_loss_shrinks_with_the_square_of_the_period() {
         let mut filter = filter(PointMass, Sampling::Period(period));
         let mut loss: f64 = 0.0;
         let schedule = Schedule { step: period, steps: (4.0 / period) as usize, substeps: 1 };
-        closed_loop(
-            &mut filter,
-            &PointMass,
-            vector![5.0, 5.0, 1.0, -1.0],
-            schedule,
-            damping,
-            |_, _, _, r| {
-                assert_eq!((r.period, r.predicted), (period, true));
-                loss = loss.max(r.barriers[0].sampling_loss);
-            },
-        )
+        closed_loop(&mut filter, &PointMass, [5.0, 5.0, 1.0, -1.0], schedule, damping, |_, _, _, r| {
+            assert_eq!((r.period, r.predicted), (period, true));
+            loss = loss.max(r.barriers[0].sampling_loss);
+        })
         .expect("valid schedule");
         loss
     };
@@ -388,23 +381,23 @@ proptest! {
         let (mut whole, mut second) = (build(), build());
         let mut u = [0.0; 2];
         second.step(0.7, &[45.0, 45.0, 1.0, 1.0], &[0.0; 2], &mut u).expect("right dimensions");
-        let mut x = SVector::<f64, 4>::from(x0);
+        let mut x = x0;
         for k in 0..60 {
             let t = k as f64 * 0.05;
             if k == interrupt {
                 second.restore(whole.state()).expect("as many barriers");
             }
             let mut wanted = [0.0; 2];
-            whole.step(t, x.as_slice(), &[0.0; 2], &mut wanted).expect("right dimensions");
+            whole.step(t, &x, &[0.0; 2], &mut wanted).expect("right dimensions");
             if k >= interrupt {
-                second.peek(t, x.as_slice(), &[0.0; 2], &mut u).expect("right dimensions");
+                second.peek(t, &x, &[0.0; 2], &mut u).expect("right dimensions");
                 prop_assert_eq!(u.map(f64::to_bits), wanted.map(f64::to_bits), "peek at {}", t);
-                second.step(t, x.as_slice(), &[0.0; 2], &mut u).expect("right dimensions");
+                second.step(t, &x, &[0.0; 2], &mut u).expect("right dimensions");
                 prop_assert_eq!(u.map(f64::to_bits), wanted.map(f64::to_bits), "at {}", t);
                 prop_assert_eq!(whole.report(), second.report());
                 prop_assert_eq!(whole.state(), second.state());
             }
-            x = rk4_step(&bicycle(), &x, &SVector::from(wanted), 0.05);
+            x = rk4_step(&bicycle(), &x, &wanted, 0.05);
         }
     }
 
@@ -448,13 +441,13 @@ fn every_answer_is_optimal() {
             .and_then(FilterBuilder::build)
             .expect("valid filter");
         assert_eq!(filter.residuals(&[0.0; 2], &[0.0; 2]), Ok(None), "nothing was solved yet");
-        let (mut x, mut u) = (vector![0.0, 0.0, 1.0, 0.0], vector![0.0, 0.0]);
+        let (mut x, mut u) = ([0.0, 0.0, 1.0, 0.0], [0.0, 0.0]);
         let mut filtered = 0;
         for k in 0..1000 {
             let u_ref = [-x[2], -x[3]];
-            let report = filter.step(f64::from(k) * 0.01, x.as_slice(), &u_ref, u.as_mut_slice());
+            let report = filter.step(f64::from(k) * 0.01, &x, &u_ref, &mut u);
             let status = report.expect("right dimensions").status;
-            let residuals = filter.residuals(&u_ref, u.as_slice()).expect("right dimensions");
+            let residuals = filter.residuals(&u_ref, &u).expect("right dimensions");
             if status.is_satisfied() {
                 let r = residuals.expect("a program was solved");
                 let worst = r.stationarity.max(r.violation).max(r.negativity).max(r.complementarity);
@@ -464,8 +457,8 @@ fn every_answer_is_optimal() {
             x = rk4_step(&PointMass, &x, &u, 0.01);
         }
         assert!(filtered > 300, "{sampling:?}: {filtered} steps filtered");
-        filter.step(11.0, &[f64::NAN; 4], &[0.0; 2], u.as_mut_slice()).expect("right dimensions");
-        assert_eq!(filter.residuals(&[0.0; 2], u.as_slice()), Ok(None), "nothing was solved");
+        filter.step(11.0, &[f64::NAN; 4], &[0.0; 2], &mut u).expect("right dimensions");
+        assert_eq!(filter.residuals(&[0.0; 2], &u), Ok(None), "nothing was solved");
     }
 }
 
@@ -512,7 +505,7 @@ struct Ditch {
 }
 
 impl<const N: usize> Barrier<N> for Ditch {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, N>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; N]) -> S {
         -(-((x[0] - self.at) / self.width).squared()).exp() * 2.0 + 1.0
     }
 }
@@ -538,7 +531,7 @@ fn ditches_crossed<const N: usize>(source: impl Fn(Ditch) -> Box<dyn DerivativeS
             filter.step(f64::from(k) * period, &x, &wanted, &mut u).expect("right dimensions");
             let speaks = filter.report().barriers[0].on_course;
             let from = x[0];
-            x = rk4_step(&Integrator::<N>, &x.into(), &u.into(), period).into();
+            x = rk4_step(&Integrator::<N>, &x, &u, period);
             let crosses = from < at && at < x[0];
             assert!(!speaks || !crosses, "case {case}: {from} to {}, {width} at {at}", x[0]);
             on_course += u32::from(speaks);
@@ -568,13 +561,13 @@ struct Gust {
 }
 
 impl ControlAffine<2, 1> for Gust {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+    fn drift<S: Scalar>(&self, x: &[S; 2]) -> [S; 2] {
         let gust = (-((x[0] - self.at) / self.width).squared()).exp();
-        vector![x[1], gust * self.strength]
+        [x[1], gust * self.strength]
     }
 
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
-        vector![S::zero(), S::one()]
+    fn input_map<S: Scalar>(&self, _x: &[S; 2]) -> [[S; 1]; 2] {
+        [[S::zero()], [S::one()]]
     }
 }
 
@@ -598,9 +591,9 @@ fn what_is_on_course_is_not_blown_into_a_wall() {
             .expect("valid filter");
         let mut u = [0.0];
         filter.step(0.0, &[0.0, speed], &[part(401) - 0.5], &mut u).expect("right dimensions");
-        let (mut x, mut highest) = (vector![0.0, speed], 0.0_f64);
+        let (mut x, mut highest) = ([0.0, speed], 0.0_f64);
         for _ in 0..20_000 {
-            x = rk4_step(&plant, &x, &u.into(), period / 20_000.0);
+            x = rk4_step(&plant, &x, &u, period / 20_000.0);
             highest = highest.max(x[0]);
         }
         let speaks = filter.report().barriers[0].on_course;
@@ -622,13 +615,13 @@ impl ControlAffine<3, 1> for Gusty {
     // Said to, so that nothing narrow is looked for in between.
     const BENDS_SLOWLY: bool = true;
 
-    fn drift<S: Scalar>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
+    fn drift<S: Scalar>(&self, x: &[S; 3]) -> [S; 3] {
         let part = x[2] / self.hold;
-        vector![x[1], (part.squared() * 12.0 - part * 6.3) * self.strength, S::one()]
+        [x[1], (part.squared() * 12.0 - part * 6.3) * self.strength, S::one()]
     }
 
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 3>) -> SMatrix<S, 3, 1> {
-        vector![S::zero(), S::one(), S::zero()]
+    fn input_map<S: Scalar>(&self, _x: &[S; 3]) -> [[S; 1]; 3] {
+        [[S::zero()], [S::one()], [S::zero()]]
     }
 }
 
@@ -638,7 +631,7 @@ struct Wall;
 impl Barrier<3> for Wall {
     const BENDS_ONE_WAY: bool = true;
 
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 3>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; 3]) -> S {
         x[0]
     }
 }

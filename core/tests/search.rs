@@ -17,10 +17,9 @@ use punctual_core::convergence::sampled::PeriodBound;
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Phase, Sampling, Status};
 use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives};
-use punctual_core::nalgebra::{SMatrix, SVector};
+use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 use punctual_core::qp::Solver;
 use punctual_core::scalar::Scalar;
-use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
 
 /// xorshift64*: the same everywhere.
 struct Random(u64);
@@ -51,7 +50,7 @@ enum Set {
 }
 
 impl Barrier<4> for Set {
-    fn value<S: Scalar>(&self, t: S, x: &SVector<S, 4>) -> S {
+    fn value<S: Scalar>(&self, t: S, x: &[S; 4]) -> S {
         match self {
             Self::Distance(disc) => disc.value(t, x),
             Self::Quadratic(disc) => disc.value(t, x),
@@ -290,13 +289,13 @@ fn run<P>(
         1 => Some([40.0, 10.0 * scale]),
         _ => Some([6.0, scale]),
     };
-    let mut x = SVector::from([
+    let mut x = [
         random.between(-40.0, 40.0),
         random.between(-40.0, 40.0),
         random.between(-3.2, 3.2),
         random.between(-12.0, 12.0),
-    ]);
-    let inside = (random.below(4) == 0).then_some(x.into());
+    ];
+    let inside = (random.below(4) == 0).then_some(x);
     let (mut filter, promises) = build(plant, &sets(random, with_obstacles, inside), bound, period);
     let hostile = random.below(3);
     let mut t = 0.0;
@@ -310,17 +309,17 @@ fn run<P>(
         };
         let mut u = [0.0; 2];
         let start = Instant::now();
-        let report = filter.step(t, x.as_slice(), &u_ref, &mut u).expect("right dimensions");
+        let report = filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
         let micros = start.elapsed().as_secs_f64() * 1e6;
         let (status, predicted) = (report.status, report.predicted);
         if k % stride == stride - 1 && predicted && status != Status::Singular {
             tally.longest = tally.longest.max(micros);
             tally.sum += micros;
             let states = filter.state().barriers.clone();
-            let mut case = Case { rows: Vec::new(), t, x: x.into(), period, bound, u_ref };
+            let mut case = Case { rows: Vec::new(), t, x: x, period, bound, u_ref };
             for ((promise, source), state) in promises.iter().zip(&states) {
                 let mut derivatives = Derivatives::ZERO;
-                source.evaluate(t, x.as_slice(), &mut derivatives);
+                source.evaluate(t, &x, &mut derivatives);
                 let h = derivatives.drift[0];
                 let Some(demand) = promise.over_period(state, t, &derivatives.drift[..2], period) else {
                     return;
@@ -336,7 +335,7 @@ fn run<P>(
             }
             check(&case, status, u, fine, tally, name);
         }
-        x = rk4_step(&plant, &x, &SVector::from(u), period);
+        x = rk4_step(&plant, &x, &u, period);
         t += period;
     }
 }
@@ -389,18 +388,18 @@ fn check(case: &Case, status: Status, u: [f64; 2], fine: usize, tally: &mut Tall
 struct Line;
 
 impl ControlAffine<1, 1> for Line {
-    fn drift<S: Scalar>(&self, _x: &SVector<S, 1>) -> SVector<S, 1> {
-        SVector::from([S::zero()])
+    fn drift<S: Scalar>(&self, _x: &[S; 1]) -> [S; 1] {
+        [S::zero()]
     }
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 1>) -> SMatrix<S, 1, 1> {
-        SMatrix::from_element(S::one())
+    fn input_map<S: Scalar>(&self, _x: &[S; 1]) -> [[S; 1]; 1] {
+        [[S::one()]]
     }
 }
 
 struct Below;
 
 impl Barrier<1> for Below {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 1>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; 1]) -> S {
         -x[0] + 10.0
     }
 }
@@ -501,14 +500,14 @@ fn a_step_taken_again_gives_the_same_input() {
             .expect("valid filter");
         // Headed for the centre.
         let off = if straight { 0.0 } else { random.between(-1e-2, 1e-2) };
-        let mut x = SVector::from([0.0, 0.0, centre[1].atan2(centre[0]) + off, 0.0]);
+        let mut x = [0.0, 0.0, centre[1].atan2(centre[0]) + off, 0.0];
         for k in 0..(1.5 * settings.deadline.expect("a deadline") / STEP) as usize {
             let t = k as f64 * STEP;
             let state = filter.state().clone();
             filter.expect_hold(Some(10.0_f64.powf(random.between(-6.0, -1.5)))).expect("valid hold");
             let mut u = [[0.0; 2]; 3];
             for u in &mut u {
-                filter.step(t, x.as_slice(), &[0.0; 2], u).expect("right dimensions");
+                filter.step(t, &x, &[0.0; 2], u).expect("right dimensions");
             }
             samples += 1;
             let [first, again, once_more] = u.map(|u| u[0].hypot(u[1]));
@@ -518,8 +517,8 @@ fn a_step_taken_again_gives_the_same_input() {
             }
             filter.restore(&state).expect("its own state");
             filter.expect_hold(None).expect("valid hold");
-            filter.step(t, x.as_slice(), &[0.0; 2], &mut u[0]).expect("right dimensions");
-            x = rk4_step(&Unicycle, &x, &SVector::from(u[0]), STEP);
+            filter.step(t, &x, &[0.0; 2], &mut u[0]).expect("right dimensions");
+            x = rk4_step(&Unicycle, &x, &u[0], STEP);
         }
     }
     println!("{samples} samples: {} give another input when taken again", others.len());
@@ -544,7 +543,7 @@ fn a_kept_bend_only_shortens_the_search() {
         let bound = seed.is_multiple_of(4).then(|| [random.between(5.0, 40.0), random.between(0.5, 10.0)]);
         let mut filters = [(); 2].map(|()| build(plant, &sets, bound, period).0);
         let [filter, without] = &mut filters;
-        let mut x = SVector::from([0.0, 0.0, random.between(-0.5, 0.5), random.between(1.0, 6.0)]);
+        let mut x = [0.0, 0.0, random.between(-0.5, 0.5), random.between(1.0, 6.0)];
         let (kind, mut wanted) = (random.below(3), [0.0; 2]);
         for k in 0..(4.0 / period).min(1000.0) as usize {
             // Zero, damping, and now and then another one.
@@ -559,7 +558,7 @@ fn a_kept_bend_only_shortens_the_search() {
             without.restore(&state).expect("as many barriers");
             let step = |filter: &mut Filter| {
                 let mut u = [0.0; 2];
-                let report = filter.step(t, x_now.as_slice(), &u_ref, &mut u).expect("right dimensions");
+                let report = filter.step(t, &x_now, &u_ref, &mut u).expect("right dimensions");
                 (report.status, u)
             };
             let (status, u) = step(filter);
@@ -581,7 +580,7 @@ fn a_kept_bend_only_shortens_the_search() {
                 repeated += 1;
             }
             filter.restore(&after).expect("its own state");
-            x = rk4_step(&plant, &x, &SVector::from(u), period);
+            x = rk4_step(&plant, &x, &u, period);
         }
         [samples, kept, repeated]
     }
@@ -610,33 +609,33 @@ fn a_row_that_is_curved_inwards_is_solved_at_once() {
         let disc = DistanceDisc::new([45.0, 45.0], 2.0, 2.0).expect("valid disc");
         let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(10.0) };
         let (mut filter, promises) = build(Unicycle, &[(Set::Distance(disc), settings)], None, PERIOD);
-        let mut x = SVector::from([
+        let mut x = [
             random.between(0.0, 20.0),
             random.between(0.0, 20.0),
             random.between(0.5, 1.1),
             random.between(2.0, 8.0),
-        ]);
+        ];
         for k in 0..40 {
             let (t, mut u) = (f64::from(k) * PERIOD, [0.0; 2]);
             let u_ref = [random.between(-3.0, 0.0), random.between(-1.0, 1.0)];
-            let report = filter.step(t, x.as_slice(), &u_ref, &mut u).expect("right dimensions");
+            let report = filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
             if report.status == Status::Filtered {
                 solved += 1;
                 at_once += u32::from(report.solver == Solver::ClosedForm);
                 let (promise, source) = &promises[0];
                 let mut derivatives = Derivatives::ZERO;
-                source.evaluate(t, x.as_slice(), &mut derivatives);
+                source.evaluate(t, &x, &mut derivatives);
                 let state = filter.state().barriers[0];
                 let demand =
                     promise.over_period(&state, t, &derivatives.drift[..2], PERIOD).expect("no approach");
                 let rows = vec![Asked { source: &**source, demand, floor: None }];
-                let case = Case { rows, t, x: x.into(), period: PERIOD, bound: None, u_ref };
+                let case = Case { rows, t, x: x, period: PERIOD, bound: None, u_ref };
                 assert!(case.violation(u) <= 1e-8, "{seed} at {t}: {u:?}");
                 // A point of the oracle is as exact as its last step.
                 let (_, nearest) = case.oracle(1.05 * case.distance(u), 17).expect("at least that one");
                 assert!(case.distance(u) <= nearest + 1e-6, "{seed} at {t}: {u:?} {nearest}");
             }
-            x = rk4_step(&Unicycle, &x, &SVector::from(u), PERIOD);
+            x = rk4_step(&Unicycle, &x, &u, PERIOD);
         }
     }
     // Where the vehicle crosses the line of sight other answers are looked for.

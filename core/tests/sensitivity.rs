@@ -13,7 +13,7 @@ use punctual_core::filter::{
     SampleDerivative, Sampling, Status, Strictness,
 };
 use punctual_core::lie::{DerivativeSource, Derivatives, Direction};
-use punctual_reference::plants::{Bicycle, KinematicBicycle, PointMass, SmallSlipBicycle, Unicycle};
+use punctual_core::plants::{Bicycle, KinematicBicycle, PointMass, SmallSlipBicycle, Unicycle};
 
 /// Step of the differences, in units of x and u of order 1 to 10.
 const STEP: f64 = 1e-4;

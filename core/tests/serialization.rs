@@ -12,8 +12,8 @@ use punctual_core::filter::{
     SampleDerivative, Sampling, Strictness,
 };
 use punctual_core::lie::Direction;
+use punctual_core::plants::Unicycle;
 use punctual_core::qp::Bounds;
-use punctual_reference::plants::Unicycle;
 use scenario::{distance_disc, quadratic_disc};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -48,7 +48,7 @@ fn run(filter: &mut Filter, x: &mut [f64; 4], from: usize, count: usize) -> Vec<
             let mut u = [0.0; 2];
             let report = filter.step(k as f64 * STEP, x, &[1.0, 0.1], &mut u).expect("right lengths");
             let said = json(report);
-            *x = rk4_step(&Unicycle, &(*x).into(), &u.into(), STEP).into();
+            *x = rk4_step(&Unicycle, x, &u, STEP);
             format!("{said} {:?}", u.map(f64::to_bits))
         })
         .collect()

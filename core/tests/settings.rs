@@ -5,8 +5,8 @@ mod scenario;
 use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
 use punctual_core::filter::{BarrierSettings, Filter, FilterState, Method};
 use punctual_core::lie;
+use punctual_core::plants::{Bicycle, PointMass};
 use punctual_core::{Error, ErrorKind};
-use punctual_reference::plants::{Bicycle, PointMass};
 use punctual_reference::simulation::{Schedule, closed_loop};
 use scenario::{Integrator, NonNegative, damping, distance_disc, goal};
 
@@ -169,8 +169,7 @@ fn a_run_needs_a_step() {
     let mut filter = goal(BarrierSettings::within(5.0));
     for step in [0.0, -1.0, f64::NAN] {
         let schedule = Schedule { step, steps: 1, substeps: 1 };
-        let result =
-            closed_loop(&mut filter, &PointMass, [0.0; 4].into(), schedule, damping, |_, _, _, _| {});
+        let result = closed_loop(&mut filter, &PointMass, [0.0; 4], schedule, damping, |_, _, _, _| {});
         refused(result, ErrorKind::Range, &format!("step: is {step}, must be finite and > 0"));
     }
 }

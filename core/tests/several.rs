@@ -5,20 +5,19 @@ mod scenario;
 use punctual_core::barriers::{DistanceDisc, HalfPlane, NormBound, Outside, StateBound};
 use punctual_core::dynamics::rk4_step;
 use punctual_core::filter::{BarrierSettings, Begin, End, Filter, FilterBuilder, Phase, Status};
-use punctual_core::nalgebra::SVector;
-use punctual_reference::plants::PointMass;
+use punctual_core::plants::PointMass;
 
 fn disc(x: f64, y: f64) -> DistanceDisc {
     DistanceDisc::new([x, y], 2.0, 2.0).expect("valid disc")
 }
 
 /// Runs with damping at 100 Hz until `end`; `check` sees time, state and the filter after each step.
-fn run(filter: &mut Filter, x0: [f64; 4], end: f64, mut check: impl FnMut(f64, &SVector<f64, 4>, &Filter)) {
-    let (mut x, mut u, step) = (SVector::from(x0), SVector::<f64, 2>::zeros(), 0.01);
+fn run(filter: &mut Filter, x0: [f64; 4], end: f64, mut check: impl FnMut(f64, &[f64; 4], &Filter)) {
+    let (mut x, mut u, step) = (x0, [0.0; 2], 0.01);
     for k in 0..=(end / step).round() as u32 {
         let t = f64::from(k) * step;
         let u_ref = [-x[2], -x[3]];
-        filter.step(t, x.as_slice(), &u_ref, u.as_mut_slice()).expect("right dimensions");
+        filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
         check(t, &x, filter);
         x = rk4_step(&PointMass, &x, &u, step);
     }
@@ -57,7 +56,7 @@ fn one_after_the_other() {
     }
 }
 
-fn disc_holds(x: &SVector<f64, 4>, cx: f64, cy: f64) -> bool {
+fn disc_holds(x: &[f64; 4], cx: f64, cy: f64) -> bool {
     (x[0] - cx).hypot(x[1] - cy) <= 2.0
 }
 

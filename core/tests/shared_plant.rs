@@ -10,8 +10,7 @@ use punctual_core::barriers::{DistanceDisc, Outside, StateBound};
 use punctual_core::dynamics::{ControlAffine, IntegratedInput, rk4_step};
 use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder};
 use punctual_core::lie::{self, DerivativeSource};
-use punctual_core::nalgebra::SVector;
-use punctual_reference::plants::{Bicycle, PointMass, SmallSlipBicycle, Unicycle};
+use punctual_core::plants::{Bicycle, PointMass, SmallSlipBicycle, Unicycle};
 use support::Reduced;
 
 /// A source, or the same one alone.
@@ -50,18 +49,18 @@ where
 {
     let [mut shared, mut alone] = [false, true].map(|alone| filter(plant, &mut Draw::new(seed), alone));
     let mut draw = Draw::new(seed + 1000);
-    let mut x = SVector::from([0.0, 0.0, draw.uniform(0.0, 1.0), draw.uniform(0.0, 5.0)]);
+    let mut x = [0.0, 0.0, draw.uniform(0.0, 1.0), draw.uniform(0.0, 5.0)];
     let mut t = 0.0;
     for k in 0..400 {
         let u_ref =
             [draw.uniform(-6.0, 6.0), draw.uniform(-2.0, 2.0)].map(|u| if k % 3 == 0 { 0.0 } else { u });
         let (mut u, mut wanted) = ([0.0; 2], [0.0; 2]);
-        let report = shared.step(t, x.as_slice(), &u_ref, &mut u).expect("right dimensions");
-        let expected = alone.step(t, x.as_slice(), &u_ref, &mut wanted).expect("right dimensions");
+        let report = shared.step(t, &x, &u_ref, &mut u).expect("right dimensions");
+        let expected = alone.step(t, &x, &u_ref, &mut wanted).expect("right dimensions");
         assert_eq!((report, u), (expected, wanted), "seed {seed}, step {k}");
         assert_eq!(shared.state(), alone.state(), "seed {seed}, step {k}");
         let dt = draw.uniform(0.005, 0.05);
-        (x, t) = (rk4_step(&plant, &x, &SVector::from(u), dt), t + dt);
+        (x, t) = (rk4_step(&plant, &x, &u, dt), t + dt);
     }
 }
 

@@ -116,7 +116,7 @@ impl fmt::Debug for CodeModel {
 }
 
 impl CodeModel {
-    /// The model that `code` computes with `parameters`. It is tried at [`samples`](punctual_core::lie::samples)
+    /// The model that `code` computes with `parameters`. It is tried at built-in samples
     /// of states within `ranges`, which shows how much memory it needs. Later steps may do twice as many
     /// operations and 64 more.
     ///
@@ -187,7 +187,7 @@ pub struct CodeBarrier {
 }
 
 impl CodeBarrier {
-    /// The relative degree, found on [`samples`](punctual_core::lie::samples) of states within `ranges`.
+    /// The relative degree, found on built-in samples of states within `ranges`.
     pub fn relative_degree(&self, ranges: &[[f64; 2]]) -> RelativeDegree {
         motion::relative_degree(&self.equations, &self.equations, ranges, false)
     }

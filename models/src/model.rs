@@ -176,7 +176,7 @@ pub struct Barrier {
 }
 
 impl Barrier {
-    /// The relative degree, found on [`samples`](punctual_core::lie::samples) of states within `ranges`.
+    /// The relative degree, found on built-in samples of states within `ranges`.
     pub fn relative_degree(&self, ranges: &[[f64; 2]]) -> RelativeDegree {
         motion::relative_degree(
             &self.model.equations(None),

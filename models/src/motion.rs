@@ -5,11 +5,12 @@ use std::cell::RefCell;
 
 use punctual_core::MAX_RELATIVE_DEGREE;
 use punctual_core::dynamics::DynPlant;
+use punctual_core::internal::{self, Coefficients, SUBSTEPS};
 use punctual_core::interval::Interval;
 use punctual_core::jet::{Dual, Tangent};
 use punctual_core::lie::{
-    self, Ahead, COURSE, Coefficients, Course, CourseOver, DerivativeSource, Derivatives, Direction,
-    Directional, Predict, PredictDirectional, RateOver, RelativeDegree, SUBSTEPS, SharedPlant,
+    Ahead, COURSE, Course, CourseOver, DerivativeSource, Derivatives, Direction, Directional, Predict,
+    PredictDirectional, RateOver, RelativeDegree, SharedPlant,
 };
 use punctual_core::scalar::Scalar;
 
@@ -65,7 +66,7 @@ macro_rules! with_directions {
     };
 }
 
-/// The relative degree of the barrier `along` the plant, found on [`samples`](lie::samples) of states within `ranges`. With
+/// The relative degree of the barrier `along` the plant, found on built-in samples of states within `ranges`. With
 /// inputs that are 0; or `driven`, with others: an input that enters only as a factor of another one is seen then.
 pub(crate) fn relative_degree<E: Equations>(
     plant: &E,
@@ -80,10 +81,10 @@ pub(crate) fn relative_degree<E: Equations>(
         driven: bool,
     ) -> RelativeDegree {
         let mut series = Along::<E, Dual<M>>::new(plant, along, MAX_RELATIVE_DEGREE);
-        let samples = lie::samples(ranges);
+        let samples = internal::samples(ranges);
         // Numbers that no model treats apart.
         let u = |i: usize| if driven { 0.7 + 0.11 * i as f64 } else { 0.0 };
-        lie::relative_degree_of(plant.inputs(), samples, |t, x| series.coefficients(t, x, u))
+        internal::relative_degree_of(plant.inputs(), samples, |t, x| series.coefficients(t, x, u))
     }
     with_directions!(plant.inputs(), found(plant, along, ranges, driven))
 }
@@ -169,7 +170,7 @@ impl<E: Equations, C: Scalar> Flow<E, C> {
     /// Moves the state as the predictions of [`lie`] do: by one step where that does.
     fn predict(&mut self, duration: f64) {
         self.run(duration, 1);
-        if !lie::is_even(self.stages.each_ref().map(Vec::as_slice)) {
+        if !internal::is_even(self.stages.each_ref().map(Vec::as_slice)) {
             for (i, &start) in self.start.iter().enumerate() {
                 self.series.set(i, 0, start);
             }
@@ -177,7 +178,7 @@ impl<E: Equations, C: Scalar> Flow<E, C> {
         }
     }
 
-    /// Moves the state; the method and its order of additions are those of [`lie::flow`].
+    /// Moves the state; the method and its order of additions are those of [`flow`](punctual_core::lie::flow).
     fn run(&mut self, duration: f64, steps: usize) {
         let dt = duration / steps as f64;
         for _ in 0..steps {
@@ -548,7 +549,7 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
         for (register, &value) in (x.len()..).zip(u) {
             series.set(register, 0, Interval::from(value));
         }
-        let known = lie::enclose(x, duration, rate, held, |held| {
+        let known = internal::enclose(x, duration, rate, held, |held| {
             for (i, [state, _]) in held.iter().enumerate() {
                 series.set(i, 0, *state);
             }
@@ -571,7 +572,7 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
             return Some(low);
         }
         let slope = few_over.series.get(few_over.h, 1);
-        Some(lie::sharper(low, value.follow(t, |i, _| x[i]), slope, duration))
+        Some(internal::sharper(low, value.follow(t, |i, _| x[i]), slope, duration))
     }
 
     fn last_over(&self, time: Interval, path: &[CourseOver]) -> Option<Interval> {

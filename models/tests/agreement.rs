@@ -6,11 +6,11 @@ use proptest::prelude::*;
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::{ControlAffine, DynPlant, Erased};
+use punctual_core::internal;
 use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives, Direction, RelativeDegree};
-use punctual_core::nalgebra::{SMatrix, SVector};
+use punctual_core::plants::{Bicycle, KinematicBicycle, PointMass, SmallSlipBicycle, Unicycle};
 use punctual_core::scalar::Scalar;
 use punctual_models::Model;
-use punctual_reference::plants::{Bicycle, KinematicBicycle, PointMass, SmallSlipBicycle, Unicycle};
 
 /// A random expression: text for the one side, a tree for the other.
 #[derive(Clone, Debug)]
@@ -39,7 +39,7 @@ impl Tree {
         }
     }
 
-    fn value<S: Scalar>(&self, t: S, x: &SVector<S, 2>) -> S {
+    fn value<S: Scalar>(&self, t: S, x: &[S; 2]) -> S {
         match self {
             Self::State(i) => x[*i],
             Self::Time => t,
@@ -103,17 +103,17 @@ fn tree(time: bool) -> impl Strategy<Value = Tree> {
 struct Random([Tree; 3]);
 
 impl ControlAffine<2, 2> for Random {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-        SVector::from([self.0[0].value(S::zero(), x), self.0[1].value(S::zero(), x)])
+    fn drift<S: Scalar>(&self, x: &[S; 2]) -> [S; 2] {
+        [self.0[0].value(S::zero(), x), self.0[1].value(S::zero(), x)]
     }
 
-    fn input_map<S: Scalar>(&self, x: &SVector<S, 2>) -> SMatrix<S, 2, 2> {
-        SMatrix::from([[S::one(), self.0[2].value(S::zero(), x)], [S::zero(), S::one()]])
+    fn input_map<S: Scalar>(&self, x: &[S; 2]) -> [[S; 2]; 2] {
+        [[S::one(), S::zero()], [self.0[2].value(S::zero(), x), S::one()]]
     }
 }
 
 impl Barrier<2> for Tree {
-    fn value<S: Scalar>(&self, t: S, x: &SVector<S, 2>) -> S {
+    fn value<S: Scalar>(&self, t: S, x: &[S; 2]) -> S {
         Self::value(self, t, x)
     }
 }
@@ -203,7 +203,7 @@ where
     let found = barrier.source(2).expect("in range");
     let wanted = lie::along(plant, disc(), 2).expect("in range");
     let simulated: Box<dyn DynPlant> = Box::new(Erased(plant));
-    for (_, x) in lie::samples(&[[-3.0, 3.0]; NX]).into_iter().cycle().take(50) {
+    for (_, x) in internal::samples(&[[-3.0, 3.0]; NX]).into_iter().cycle().take(50) {
         let pairs = both(&*found, &*wanted, &x, &[0.7, -0.2]);
         let size = pairs.iter().map(|p| p[1].abs()).fold(1.0, f64::max);
         for (i, [found, wanted]) in pairs.into_iter().enumerate() {
@@ -304,7 +304,7 @@ fn barriers_along_one_model_share_the_plant() {
     let [one, shared, longer] = [&one, &other, &longer].map(|s| s.shared().expect("a source that shares"));
     assert!(one.shares(shared.plant()) && shared.shares(one.plant()) && !one.shares(longer.plant()));
     let [mut motion, mut ahead] = one.rooms();
-    for (t, x) in lie::samples(&[[-3.0, 3.0]; 4]).into_iter().take(50) {
+    for (t, x) in internal::samples(&[[-3.0, 3.0]; 4]).into_iter().take(50) {
         let (mut found, mut wanted) = (Derivatives::ZERO, Derivatives::ZERO);
         one.motion(&x, &mut *motion);
         shared.evaluate_along(t, &*motion, &mut found);

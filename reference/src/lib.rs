@@ -2,13 +2,12 @@
 //!
 //! | module | owns |
 //! |---|---|
-//! | [`plants`] | point mass, unicycle, bicycles: written once against the traits of the core |
 //! | [`nominal`] | controllers that want an input, for a filter to change |
 //! | [`baselines`] | the constraints of the literature, as conditions of a promise |
 //! | [`simulation`] | a closed loop of a plant and a filter |
 //! | [`effort`] | a closed loop that is watched: the input that filters need, compared |
 //!
-//! Nothing of a filter depends on this crate.
+//! Plants are in [`punctual_core::plants`]. Nothing of a filter depends on this crate.
 #![forbid(unsafe_code)]
 // Elementary functions are those of the core: clippy.toml.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
@@ -16,5 +15,4 @@
 pub mod baselines;
 pub mod effort;
 pub mod nominal;
-pub mod plants;
 pub mod simulation;

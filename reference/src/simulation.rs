@@ -1,7 +1,5 @@
 //! Closed loops in process, for studies and tests: a filter, a plant integrated by RK4, held inputs.
 
-use nalgebra::SVector;
-
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::error::{Error, positive};
 use punctual_core::filter::{Filter, Report};
@@ -27,10 +25,10 @@ pub struct Schedule {
 pub fn closed_loop<P, const NX: usize, const NU: usize>(
     filter: &mut Filter,
     plant: &P,
-    x0: SVector<f64, NX>,
+    x0: [f64; NX],
     schedule: Schedule,
-    nominal: impl FnMut(f64, &SVector<f64, NX>) -> SVector<f64, NU>,
-    observe: impl FnMut(f64, &SVector<f64, NX>, &SVector<f64, NU>, &Report),
+    nominal: impl FnMut(f64, &[f64; NX]) -> [f64; NU],
+    observe: impl FnMut(f64, &[f64; NX], &[f64; NU], &Report),
 ) -> Result<(), Error>
 where
     P: ControlAffine<NX, NU>,
@@ -46,21 +44,21 @@ where
 /// As for [`closed_loop`].
 pub fn closed_loop_by<const NX: usize, const NU: usize>(
     filter: &mut Filter,
-    mut advance: impl FnMut(&SVector<f64, NX>, &SVector<f64, NU>, f64) -> SVector<f64, NX>,
-    x0: SVector<f64, NX>,
+    mut advance: impl FnMut(&[f64; NX], &[f64; NU], f64) -> [f64; NX],
+    x0: [f64; NX],
     schedule: Schedule,
-    mut nominal: impl FnMut(f64, &SVector<f64, NX>) -> SVector<f64, NU>,
-    mut observe: impl FnMut(f64, &SVector<f64, NX>, &SVector<f64, NU>, &Report),
+    mut nominal: impl FnMut(f64, &[f64; NX]) -> [f64; NU],
+    mut observe: impl FnMut(f64, &[f64; NX], &[f64; NU], &Report),
 ) -> Result<(), Error> {
     let step = positive("step", schedule.step)?;
     let substeps = schedule.substeps.max(1);
     let dt = step / substeps as f64;
     let mut x = x0;
-    let mut u = SVector::<f64, NU>::zeros();
+    let mut u = [0.0; NU];
     for k in 0..=schedule.steps {
         let t = k as f64 * step;
         let u_ref = nominal(t, &x);
-        let report = filter.step(t, x.as_slice(), u_ref.as_slice(), u.as_mut_slice())?;
+        let report = filter.step(t, &x, &u_ref, &mut u)?;
         observe(t, &x, &u, report);
         if k < schedule.steps {
             for _ in 0..substeps {

@@ -1,6 +1,8 @@
 //! What bounds and u_ref leave of a promise: rows alone, plans, and the filters of the literature that fall back on a
 //! backup.
 
+use std::array::from_fn;
+
 use punctual_core::elementary;
 use rayon::prelude::*;
 
@@ -9,10 +11,9 @@ use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{BarrierSettings, Filter, Sampling};
 use punctual_core::lie;
-use punctual_core::nalgebra::SVector;
+use punctual_core::plants::{Bicycle, MovedPoint, PointMass, Unicycle};
 use punctual_core::qp::Bounds;
 use punctual_reference::baselines::{Backup, BackupBarrier, Brake, Gatekeeper, Stoppable, Tube};
-use punctual_reference::plants::{Bicycle, MovedPoint, PointMass, Unicycle};
 
 use super::baseline::Baseline;
 use super::cases::{CENTRE, DEADLINE, Nominal, RADIUS, REAR, SMOOTHING, Setup, Vehicle};
@@ -120,15 +121,15 @@ struct Run {
 }
 
 /// A filter in a loop: the input, and whether the promise is accepted, for time, state and u_ref within its bounds.
-type Law<const NX: usize> = Box<dyn FnMut(f64, &SVector<f64, NX>, &SVector<f64, 2>) -> Step>;
-type Step = Result<(SVector<f64, 2>, bool), punctual_core::Error>;
+type Law<const NX: usize> = Box<dyn FnMut(f64, &[f64; NX], &[f64; 2]) -> Step>;
+type Step = Result<([f64; 2], bool), punctual_core::Error>;
 
 /// A plant with its brake, and what u_ref is.
 struct Case<'a, P, const NX: usize> {
     plant: P,
     bounds: [f64; 2],
     period: f64,
-    nominal: &'a dyn Fn(&SVector<f64, NX>) -> SVector<f64, 2>,
+    nominal: &'a dyn Fn(&[f64; NX]) -> [f64; 2],
 }
 
 fn disc() -> Result<DistanceDisc, punctual_core::Error> {
@@ -145,7 +146,7 @@ fn limits(bounds: [f64; 2]) -> Bounds {
 
 impl<P: ControlAffine<NX, 2>, const NX: usize> Case<'_, P, NX> {
     /// Runs `filter` from `x`.
-    fn run(&self, task: Task, mut filter: Law<NX>, mut x: SVector<f64, NX>) -> Result<Run, Error> {
+    fn run(&self, task: Task, mut filter: Law<NX>, mut x: [f64; NX]) -> Result<Run, Error> {
         let (disc, limits) = (disc().map_err(Error::from)?, limits(self.bounds));
         let (period, look) = (self.period, self.period / LOOKS as f64);
         let steps = (END / period).round() as usize;
@@ -153,7 +154,7 @@ impl<P: ControlAffine<NX, 2>, const NX: usize> Case<'_, P, NX> {
         for k in 0..steps {
             let t = k as f64 * period;
             let wanted = (self.nominal)(&x);
-            let wanted = SVector::from_fn(|i, _| limits.clamp(i, wanted[i]));
+            let wanted = from_fn(|i| limits.clamp(i, wanted[i]));
             let (u, accepted) = filter(t, &x, &wanted).map_err(Error::from)?;
             run.accepted = if k == 0 { accepted } else { run.accepted };
             run.samples += 1;
@@ -182,13 +183,13 @@ fn ours<const NX: usize>(method: Method, mut filter: Filter) -> Result<Law<NX>, 
         let mut filter = filter.with_plans(PERIOD).map_err(Error::from)?;
         return Ok(Box::new(move |t, x, u_ref| {
             let mut u = *u_ref;
-            let assured = filter.step(t, x.as_slice(), u_ref.as_slice(), u.as_mut_slice())?.is_assured();
+            let assured = filter.step(t, x, u_ref, &mut u)?.is_assured();
             Ok((u, assured))
         }));
     }
     Ok(Box::new(move |t, x, u_ref| {
         let mut u = *u_ref;
-        let report = filter.step(t, x.as_slice(), u_ref.as_slice(), u.as_mut_slice())?;
+        let report = filter.step(t, x, u_ref, &mut u)?;
         let accepted = report.barriers[0].on_course;
         Ok((u, accepted))
     }))
@@ -207,7 +208,7 @@ where
 {
     let (task, method, nominal) = asked;
     let bounds = Body::Of(vehicle).bounds();
-    let u_ref = move |x: &SVector<f64, 4>| vehicle.reference(nominal, x);
+    let u_ref = move |x: &[f64; 4]| vehicle.reference(nominal, x);
     let case = Case { plant, bounds, period: PERIOD, nominal: &u_ref };
     let filter: Law<4> = match method {
         Method::Gatekeeper => {
@@ -231,7 +232,7 @@ where
             ours(method, Baseline::Profile.filter(source, &setup).map_err(Error::from)?)?
         }
     };
-    case.run(task, filter, x0.into())
+    case.run(task, filter, x0)
 }
 
 /// A brake to fall back on, which keeps the disc.
@@ -252,9 +253,8 @@ fn backup<P, const M: usize>(
 /// A run of a point that is moved by its velocity.
 fn point_run((task, method, nominal): (Task, Method, Nominal), x0: [f64; 4]) -> Result<Run, Error> {
     let bounds = Body::Point.bounds();
-    let u_ref =
-        move |x: &SVector<f64, 2>| Vehicle::PointMass.reference(nominal, &[x[0], x[1], 0.0, 0.0].into());
-    let x0 = SVector::from([x0[0], x0[1]]);
+    let u_ref = move |x: &[f64; 2]| Vehicle::PointMass.reference(nominal, &[x[0], x[1], 0.0, 0.0]);
+    let x0 = [x0[0], x0[1]];
     let tube = |rate: f64| Tube::new(1, 1, rate);
     let filter = || {
         let disc = disc()?;
@@ -302,18 +302,18 @@ fn inside(body: Body, count: usize) -> Result<Vec<[f64; 4]>, Error> {
     let terminal = backup(PointMass, body.bounds(), [2, 3])?.terminal;
     let mut starts = Vec::new();
     while starts.len() < count {
-        let [p, q, angle, speed] = std::array::from_fn(|_| uniform());
+        let [p, q, angle, speed] = from_fn(|_| uniform());
         let position = [p, q].map(|c| RADIUS * (2.0 * c - 1.0));
         let (angle, speed) = (std::f64::consts::TAU * angle, 4.0 * speed);
         let at = [CENTRE[0] + position[0], CENTRE[1] + position[1]];
         let (sin, cos) = elementary::sin_cos(angle);
         let velocity = [speed * cos, speed * sin];
-        let as_point = SVector::from([at[0], at[1], velocity[0], velocity[1]]);
+        let as_point = [at[0], at[1], velocity[0], velocity[1]];
         if terminal.value(0.0, &as_point) < 0.0 {
             continue;
         }
         starts.push(match body {
-            Body::Point | Body::Of(Vehicle::PointMass) => as_point.into(),
+            Body::Point | Body::Of(Vehicle::PointMass) => as_point,
             Body::Of(_) => [at[0], at[1], angle, speed],
         });
     }

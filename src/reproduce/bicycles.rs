@@ -4,7 +4,7 @@
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::{DynPlant, Erased};
 use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Integration, Sampling};
-use punctual_reference::plants::{Bicycle, KinematicBicycle, SmallSlipBicycle, Steering};
+use punctual_core::plants::{Bicycle, KinematicBicycle, SmallSlipBicycle, Steering};
 use rayon::prelude::*;
 
 use super::cases::{CENTRE, RADIUS, SMOOTHING, Setup};

@@ -1,12 +1,13 @@
 //! The cases of the study and the demonstration: vehicles, barriers, nominal controllers, and the settings of a
 //! loop.
 
+use std::array::from_fn;
+
 use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::elementary;
 use punctual_core::lie::{self, DerivativeSource};
-use punctual_core::nalgebra::SVector;
-use punctual_reference::plants::{Bicycle, PointMass, Signal, Signals, Unicycle};
+use punctual_core::plants::{Bicycle, PointMass, Signal, Signals, Unicycle};
 
 use crate::error::Error;
 
@@ -78,19 +79,19 @@ impl Vehicle {
         }
     }
 
-    pub(super) fn reference(self, nominal: Nominal, x: &SVector<f64, 4>) -> SVector<f64, 2> {
+    pub(super) fn reference(self, nominal: Nominal, x: &[f64; 4]) -> [f64; 2] {
         let to = [CENTRE[0] - x[0], CENTRE[1] - x[1]];
         match (nominal, self) {
-            (Nominal::Coast, _) => SVector::zeros(),
-            (Nominal::Damping, _) => self.damped().map(|speed| speed.map_or(0.0, |k| -x[k])).into(),
+            (Nominal::Coast, _) => [0.0; 2],
+            (Nominal::Damping, _) => self.damped().map(|speed| speed.map_or(0.0, |k| -x[k])),
             (Nominal::Away(size), Self::PointMass) => {
                 let distance = elementary::hypot(to[0], to[1]).max(f64::MIN_POSITIVE);
-                to.map(|d| -size * d / distance).into()
+                to.map(|d| -size * d / distance)
             }
             (Nominal::Away(size), _) => {
                 let (sin, cos) = elementary::sin_cos(x[2]);
                 let ahead = to[0] * cos + to[1] * sin;
-                [if ahead < 0.0 { size } else { -size }, 0.0].into()
+                [if ahead < 0.0 { size } else { -size }, 0.0]
             }
         }
     }
@@ -118,13 +119,7 @@ impl Vehicle {
         source.map_err(Error::from)
     }
 
-    pub(super) fn advance(
-        self,
-        integrator: Integrator,
-        x: &SVector<f64, 4>,
-        u: &SVector<f64, 2>,
-        dt: f64,
-    ) -> SVector<f64, 4> {
+    pub(super) fn advance(self, integrator: Integrator, x: &[f64; 4], u: &[f64; 2], dt: f64) -> [f64; 4] {
         match self {
             Self::PointMass => integrator.step(&PointMass, x, u, dt),
             Self::Unicycle => integrator.step(&Unicycle, x, u, dt),
@@ -205,20 +200,20 @@ impl Integrator {
         }
     }
 
-    fn step<P: ControlAffine<4, 2>>(
-        self,
-        plant: &P,
-        x: &SVector<f64, 4>,
-        u: &SVector<f64, 2>,
-        dt: f64,
-    ) -> SVector<f64, 4> {
-        let slope = |x: &SVector<f64, 4>| plant.drift(x) + plant.input_map(x) * u;
+    fn step<P: ControlAffine<4, 2>>(self, plant: &P, x: &[f64; 4], u: &[f64; 2], dt: f64) -> [f64; 4] {
+        let way = |x: &[f64; 4]| {
+            let (f, g) = (plant.drift(x), plant.input_map(x));
+            from_fn::<f64, 4, _>(|i| (f[i] + (g[i][0] * u[0] + g[i][1] * u[1])) * dt)
+        };
         match self {
-            Self::Euler => x + slope(x) * dt,
+            Self::Euler => {
+                let now = way(x);
+                from_fn(|i| x[i] + now[i])
+            }
             Self::SemiImplicit => {
-                let now = slope(x) * dt;
-                let mut next = SVector::from([x[0], x[1], x[2] + now[2], x[3] + now[3]]);
-                let then = slope(&next) * dt;
+                let now = way(x);
+                let mut next = [x[0], x[1], x[2] + now[2], x[3] + now[3]];
+                let then = way(&next);
                 next[0] += then[0];
                 next[1] += then[1];
                 next

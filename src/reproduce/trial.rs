@@ -4,7 +4,6 @@ use std::time::Instant;
 
 use punctual_core::elementary;
 use punctual_core::filter::{Filter, Report};
-use punctual_core::nalgebra::SVector;
 use punctual_reference::simulation::{Schedule, closed_loop_by};
 
 use super::baseline::Baseline;
@@ -144,11 +143,11 @@ pub fn observed(
     let schedule =
         Schedule { step: setup.step, steps: (setup.end / setup.step).round() as usize, substeps: 1 };
     let mut out = Outcome::default();
-    let u_ref = |x: &SVector<f64, 4>| vehicle.reference(setup.nominal, x);
+    let u_ref = |x: &[f64; 4]| vehicle.reference(setup.nominal, x);
     closed_loop_by(
         &mut filter,
         |x, u, dt| vehicle.advance(setup.integrator, x, u, dt),
-        x0.into(),
+        x0,
         schedule,
         |_, x| u_ref(x),
         |t, x, u, report| {
@@ -156,7 +155,7 @@ pub fn observed(
             let sample = Measured {
                 t,
                 position: [x[0], x[1]],
-                u: (*u).into(),
+                u: *u,
                 h: b.h,
                 arrival: b.arrival_time,
                 satisfied: report.status.is_satisfied(),
@@ -166,7 +165,7 @@ pub fn observed(
             if t < setup.deadline + setup.step / 2.0 && b.profile.is_finite() {
                 out.shortfall = out.shortfall.max(b.profile - out.added - b.h);
             }
-            observe(&Sample { t, x: (*x).into(), u_ref: u_ref(x).into(), u: (*u).into(), report });
+            observe(&Sample { t, x: *x, u_ref: u_ref(x), u: *u, report });
         },
     )
     .map_err(Error::from)?;

@@ -3,7 +3,7 @@
 
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::lie::{self, DerivativeSource, Derivatives};
-use punctual_reference::plants::PointMass;
+use punctual_core::plants::PointMass;
 
 use crate::fmu::{EXTERNAL, FILTER, Fmu};
 use crate::slave::Slave;

@@ -9,8 +9,7 @@
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::rk4_step;
 use punctual_core::filter::{BarrierSettings, Filter, Sampling};
-use punctual_core::nalgebra::{SVector, Vector2};
-use punctual_reference::plants::Unicycle;
+use punctual_core::plants::Unicycle;
 
 use crate::running::recorded;
 use crate::table::{Table, assert_same_bits};
@@ -46,7 +45,7 @@ struct Rows {
 }
 
 impl Rows {
-    fn push(&mut self, x: &SVector<f64, 4>, u: &Vector2<f64>, h: f64) {
+    fn push(&mut self, x: &[f64; 4], u: &[f64; 2], h: f64) {
         self.x.iter_mut().zip(x.iter()).for_each(|(column, value)| column.push(*value));
         self.u.iter_mut().zip(u.iter()).for_each(|(column, value)| column.push(*value));
         self.h.push(h);
@@ -56,15 +55,15 @@ impl Rows {
 fn in_process(order: Order) -> Rows {
     let mut filter = filter();
     let mut rows = Rows::default();
-    let mut x = SVector::<f64, 4>::zeros();
+    let mut x = [0.0; 4];
     // The last result of the filter, and h of that sample. In Jacobi order these are still read when the plant is
     // at the next point. Before the first step both are a look at the start.
-    let mut last = Vector2::zeros();
-    let mut sample = |time: f64, x: &SVector<f64, 4>| {
+    let mut last = [0.0; 2];
+    let mut sample = |time: f64, x: &[f64; 4]| {
         // The nominal controller: damping, a = −v.
         let u_ref = [-x[3], 0.0];
-        let mut u = Vector2::zeros();
-        let report = filter.step(time, x.as_slice(), &u_ref, u.as_mut_slice()).expect("right lengths");
+        let mut u = [0.0; 2];
+        let report = filter.step(time, x, &u_ref, &mut u).expect("right lengths");
         (u, report.barriers[0].h)
     };
     let mut time = 0.0;

@@ -1,10 +1,11 @@
 //! Chains of n integrators from rest: the reference profile for any order.
 
+use std::array::from_fn;
+
 use punctual_core::barrier::Barrier;
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder};
 use punctual_core::lie;
-use punctual_core::nalgebra::{self, SMatrix, SVector, vector};
 use punctual_core::scalar::Scalar;
 use punctual_reference::simulation::{Schedule, closed_loop};
 
@@ -12,12 +13,12 @@ use punctual_reference::simulation::{Schedule, closed_loop};
 pub(super) struct Chain<const N: usize>;
 
 impl<const N: usize> ControlAffine<N, 1> for Chain<N> {
-    fn drift<S: Scalar>(&self, x: &SVector<S, N>) -> SVector<S, N> {
-        SVector::from_fn(|i, _| if i + 1 < N { x[i + 1] } else { S::zero() })
+    fn drift<S: Scalar>(&self, x: &[S; N]) -> [S; N] {
+        from_fn(|i| if i + 1 < N { x[i + 1] } else { S::zero() })
     }
 
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, N>) -> SMatrix<S, N, 1> {
-        SMatrix::from_fn(|i, _| if i + 1 == N { S::one() } else { S::zero() })
+    fn input_map<S: Scalar>(&self, _x: &[S; N]) -> [[S; 1]; N] {
+        from_fn(|i| from_fn(|_| if i + 1 == N { S::one() } else { S::zero() }))
     }
 }
 
@@ -25,7 +26,7 @@ impl<const N: usize> ControlAffine<N, 1> for Chain<N> {
 struct NonNegative;
 
 impl<const N: usize> Barrier<N> for NonNegative {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, N>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; N]) -> S {
         x[0]
     }
 }
@@ -48,7 +49,7 @@ fn from_rest<const N: usize>(step: f64) -> (Option<f64>, f64) {
         .and_then(|source| Filter::builder(N, 1).source("line", source, settings))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
-    let mut x0 = SVector::<f64, N>::zeros();
+    let mut x0 = [0.0; N];
     x0[0] = -1.0;
     let (mut arrival, mut least) = (None, f64::INFINITY);
     let schedule = Schedule { step, steps: (2.0 * DEADLINE / step).round() as usize, substeps: 1 };
@@ -57,7 +58,7 @@ fn from_rest<const N: usize>(step: f64) -> (Option<f64>, f64) {
         &Chain::<N>,
         x0,
         schedule,
-        |_, _| vector![0.0],
+        |_, _| [0.0],
         |t, _, _, report| {
             let b = &report.barriers[0];
             assert!(report.status.is_satisfied(), "n {N}, step {step}: {:?} at {t}", report.status);

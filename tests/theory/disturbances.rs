@@ -4,9 +4,8 @@ use punctual_core::barrier::Barrier;
 use punctual_core::barriers::StateBound;
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{BarrierSettings, Filter};
-use punctual_core::nalgebra::{self, SMatrix, SVector, vector};
+use punctual_core::plants::PointMass;
 use punctual_core::scalar::Scalar;
-use punctual_reference::plants::PointMass;
 use punctual_reference::simulation::{Schedule, closed_loop};
 
 use super::distance;
@@ -20,13 +19,13 @@ const MARGIN: f64 = 0.02;
 struct PushedAway(f64);
 
 impl ControlAffine<4, 2> for PushedAway {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
+    fn drift<S: Scalar>(&self, x: &[S; 4]) -> [S; 4] {
         let (x_c, y_c) = (x[0] - 45.0, x[1] - 45.0);
         let distance = (x_c * x_c + y_c * y_c).sqrt();
-        SVector::from([x[2], x[3], x_c / distance * self.0, y_c / distance * self.0])
+        [x[2], x[3], x_c / distance * self.0, y_c / distance * self.0]
     }
 
-    fn input_map<S: Scalar>(&self, x: &SVector<S, 4>) -> SMatrix<S, 4, 2> {
+    fn input_map<S: Scalar>(&self, x: &[S; 4]) -> [[S; 2]; 4] {
         PointMass.input_map(x)
     }
 }
@@ -36,12 +35,12 @@ impl ControlAffine<4, 2> for PushedAway {
 pub(super) struct JerkCar(pub(super) f64);
 
 impl ControlAffine<3, 1> for JerkCar {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
-        SVector::from([x[1], x[2], S::from(-self.0)])
+    fn drift<S: Scalar>(&self, x: &[S; 3]) -> [S; 3] {
+        [x[1], x[2], S::from(-self.0)]
     }
 
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 3>) -> SMatrix<S, 3, 1> {
-        SMatrix::from([S::zero(), S::zero(), S::one()])
+    fn input_map<S: Scalar>(&self, _x: &[S; 3]) -> [[S; 1]; 3] {
+        [[S::zero()], [S::zero()], [S::one()]]
     }
 }
 
@@ -58,13 +57,13 @@ fn failures<M, P, B, const NX: usize, const NU: usize>(
     [model, plant]: [M; 2],
     barrier: B,
     settings: BarrierSettings,
-    starts: impl Iterator<Item = SVector<f64, NX>>,
+    starts: impl Iterator<Item = [f64; NX]>,
     nominal: P,
 ) -> Failures
 where
     M: ControlAffine<NX, NU> + Copy + Send + 'static,
     B: Barrier<NX> + Copy + Send + 'static,
-    P: Fn(&SVector<f64, NX>) -> SVector<f64, NU>,
+    P: Fn(&[f64; NX]) -> [f64; NU],
 {
     let mut failures = Failures::default();
     for start in starts {
@@ -111,11 +110,11 @@ fn table(count: usize) -> [[Failures; 2]; 2] {
     let starts = drawn(count);
     [true, false].map(|robust| {
         let settings = |bound: f64| settings(if robust { bound } else { 0.0 });
-        let places = starts.iter().map(|x0| SVector::from(*x0));
-        let damping = |x: &SVector<f64, 4>| vector![-x[2], -x[3]];
+        let places = starts.iter().copied();
+        let damping = |x: &[f64; 4]| [-x[2], -x[3]];
         let pushed = failures([PushedAway(0.0), PushedAway(2.0)], distance(), settings(2.0), places, damping);
-        let places = starts.iter().map(|x0| vector![x0[0], x0[2], x0[3] / 5.0]);
-        let car = failures([JerkCar(0.0), JerkCar(10.0)], line, settings(10.0), places, |_| vector![-20.0]);
+        let places = starts.iter().map(|x0| [x0[0], x0[2], x0[3] / 5.0]);
+        let car = failures([JerkCar(0.0), JerkCar(10.0)], line, settings(10.0), places, |_| [-20.0]);
         [pushed, car]
     })
 }

@@ -21,25 +21,24 @@ use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Method, Sampling};
-use punctual_core::nalgebra::{self, SVector, vector};
-use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
+use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 use punctual_reference::simulation::{Schedule, closed_loop};
 
-type Nominal = fn(f64, &SVector<f64, 4>) -> SVector<f64, 2>;
+type Nominal = fn(f64, &[f64; 4]) -> [f64; 2];
 
 /// No controller.
-fn coast(_t: f64, _x: &SVector<f64, 4>) -> SVector<f64, 2> {
-    vector![0.0, 0.0]
+fn coast(_t: f64, _x: &[f64; 4]) -> [f64; 2] {
+    [0.0, 0.0]
 }
 
 /// Damping of the point mass, −v.
-fn damp_velocity(_t: f64, x: &SVector<f64, 4>) -> SVector<f64, 2> {
-    vector![-x[2], -x[3]]
+fn damp_velocity(_t: f64, x: &[f64; 4]) -> [f64; 2] {
+    [-x[2], -x[3]]
 }
 
 /// Damping of the unicycle and the bicycle, −v on the acceleration.
-fn damp_speed(_t: f64, x: &SVector<f64, 4>) -> SVector<f64, 2> {
-    vector![-x[3], 0.0]
+fn damp_speed(_t: f64, x: &[f64; 4]) -> [f64; 2] {
+    [-x[3], 0.0]
 }
 
 fn bicycle() -> Bicycle {
@@ -134,7 +133,7 @@ where
         Run { arrival: None, least_after: f64::INFINITY, peak: 0.0, peak_to_arrival: 0.0, satisfied: true };
     let deadline = settings.deadline.expect("a deadline");
     let schedule = Schedule { step, steps: (2.0 * deadline / step).round() as usize, substeps: 1 };
-    closed_loop(&mut filter, plant, x0.into(), schedule, nominal, |t, _, u, report| {
+    closed_loop(&mut filter, plant, x0, schedule, nominal, |t, _, u, report| {
         let b = &report.barriers[0];
         run.arrival = b.arrival_time;
         run.peak = run.peak.max(u[0].abs());

@@ -1,11 +1,12 @@
 //! Bounded errors of the measured state, with and without the settings that allow for them.
 
+use std::array::from_fn;
+
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::StateBound;
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{BarrierSettings, Filter, Sampling};
-use punctual_core::nalgebra::{self, SVector, vector};
-use punctual_reference::plants::PointMass;
+use punctual_core::plants::PointMass;
 
 use super::distance;
 use super::disturbances::{Failures, JerkCar};
@@ -29,9 +30,9 @@ fn failures<P, B, const NX: usize, const NU: usize>(
     (plant, barrier): (P, B),
     (errors, allowed): ([f64; NX], bool),
     noise: Noise,
-    starts: &[SVector<f64, NX>],
-    seems: impl Fn(&SVector<f64, NX>) -> [f64; NX],
-    nominal: impl Fn(&SVector<f64, NX>) -> SVector<f64, NU>,
+    starts: &[[f64; NX]],
+    seems: impl Fn(&[f64; NX]) -> [f64; NX],
+    nominal: impl Fn(&[f64; NX]) -> [f64; NU],
 ) -> Failures
 where
     P: ControlAffine<NX, NU> + Copy + Send + 'static,
@@ -52,7 +53,7 @@ where
             .and_then(|b| b.sampling(Sampling::Measured { first: Some(STEP) }))
             .and_then(|b| b.build())
             .expect("a valid filter");
-        let (mut x, mut u) = (*start, SVector::<f64, NU>::zeros());
+        let (mut x, mut u) = (*start, [0.0; NU]);
         let (mut on_time, mut outside) = (false, false);
         let mut signs = [0.0; NX];
         for k in 0..=(2.0 * DEADLINE / STEP).round() as usize {
@@ -62,9 +63,9 @@ where
                 Noise::Uniform(_) => {}
                 Noise::Biased => signs = seems(&x),
             }
-            let measured = SVector::<f64, NX>::from_fn(|i, _| x[i] + signs[i] * errors[i]);
+            let measured = from_fn::<f64, NX, _>(|i| x[i] + signs[i] * errors[i]);
             let u_ref = nominal(&measured);
-            let report = filter.step(t, measured.as_slice(), u_ref.as_slice(), u.as_mut_slice());
+            let report = filter.step(t, &measured, &u_ref, &mut u);
             failures.unmet += usize::from(!report.expect("a valid sample").status.is_satisfied());
             let h = barrier.value(t, &x);
             // Half a step, so that round-off in t cannot move the sample at the deadline.
@@ -81,18 +82,18 @@ where
 /// Point mass and jerk car, both with a wish to leave.
 fn table(count: usize, allowed: bool, noise: Noise) -> [Failures; 2] {
     let starts = drawn(count);
-    let places: Vec<_> = starts.iter().map(|x0| SVector::from(*x0)).collect();
-    let towards = |x: &SVector<f64, 4>| {
+    let places: Vec<_> = starts.to_vec();
+    let towards = |x: &[f64; 4]| {
         let [d_x, d_y] = [45.0 - x[0], 45.0 - x[1]].map(f64::signum);
         [d_x, d_y, d_x, d_y]
     };
-    let away = |x: &SVector<f64, 4>| vector![-x[2] - 10.0, -x[3] - 10.0];
+    let away = |x: &[f64; 4]| [-x[2] - 10.0, -x[3] - 10.0];
     let errors = ([0.1, 0.1, 0.2, 0.2], allowed);
     let point_mass = failures((PointMass, distance()), errors, noise, &places, towards, away);
     let line = StateBound::at_least(0, 45.0).expect("a valid barrier");
-    let places: Vec<_> = starts.iter().map(|x0| vector![x0[0], x0[2], x0[3] / 5.0]).collect();
+    let places: Vec<_> = starts.iter().map(|x0| [x0[0], x0[2], x0[3] / 5.0]).collect();
     let (car, errors) = ((JerkCar(0.0), line), ([0.1, 0.2, 0.4], allowed));
-    [point_mass, failures(car, errors, noise, &places, |_| [1.0; 3], |_| vector![-20.0])]
+    [point_mass, failures(car, errors, noise, &places, |_| [1.0; 3], |_| [-20.0])]
 }
 
 /// Steps that are not met in the thousand runs of the documentation: a known defect, not one that is allowed to

@@ -5,9 +5,8 @@
 use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Status};
-use punctual_core::nalgebra::SVector;
+use punctual_core::plants::{Bicycle, Unicycle};
 use punctual_reference::nominal::Heading;
-use punctual_reference::plants::{Bicycle, Unicycle};
 
 use super::starts::drawn;
 
@@ -83,7 +82,7 @@ where
 {
     let mut filter = filter(plant, bounds);
     let heading = Heading { speed_limit: 6.0, ..Heading::towards(GOAL.0) };
-    let mut x = SVector::from(start);
+    let mut x = start;
     let mut run = Run {
         start,
         clearance: f64::INFINITY,
@@ -96,9 +95,9 @@ where
     for k in 0..=(2.0 * DEADLINE / STEP).round() as usize {
         let t = k as f64 * STEP;
         let waypoint = heading.around([x[0], x[1]], &OBSTACLES, 1.0);
-        let u_ref = nominal(waypoint, &x.into());
-        let mut u = SVector::<f64, 2>::zeros();
-        let report = filter.step(t, x.as_slice(), &u_ref, u.as_mut_slice()).expect("right dimensions");
+        let u_ref = nominal(waypoint, &x);
+        let mut u = [0.0; 2];
+        let report = filter.step(t, &x, &u_ref, &mut u).expect("right dimensions");
         assert!(u.iter().zip(bounds).all(|(v, b)| v.abs() <= b), "{u:?} at {t}");
         for (centre, radius) in OBSTACLES {
             let edge = (x[0] - centre[0]).hypot(x[1] - centre[1]) - radius;

@@ -3,7 +3,7 @@
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{BarrierSettings, ProfileKind};
-use punctual_reference::plants::{PointMass, Unicycle};
+use punctual_core::plants::{PointMass, Unicycle};
 
 use super::starts::{DEADLINE, assert_all_keep_the_deadline, quantile, starts};
 use super::{Nominal, Run, bicycle, damp_speed, damp_velocity, distance, run};

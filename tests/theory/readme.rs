@@ -6,8 +6,7 @@
 
 use std::f64::consts::PI;
 
-use punctual_core::nalgebra::{self, SVector, vector};
-use punctual_reference::plants::Unicycle;
+use punctual_core::plants::Unicycle;
 use punctual_reference::simulation::{Schedule, closed_loop};
 
 use super::judge::case::{Case, Numbers, Reference, Set};
@@ -164,13 +163,13 @@ fn as_simulated(case: &Case) -> [f64; 2] {
     let gain = if let Reference::Damping(gain) = case.reference { gain } else { 0.0 };
     let [mut speed, mut least] = [0.0_f64, f64::INFINITY];
     let schedule = Schedule { step, steps: (case.horizon / step).round() as usize, substeps: 1 };
-    let start = SVector::from([case.start[0], case.start[1], case.start[2], case.start[3]]);
+    let start = [case.start[0], case.start[1], case.start[2], case.start[3]];
     closed_loop(
         &mut case.filter(),
         &Unicycle,
         start,
         schedule,
-        |_, x| vector![-gain * x[3], 0.0],
+        |_, x| [-gain * x[3], 0.0],
         |t, x, _, _| {
             speed = speed.max(x[3].abs());
             let h = shape.value(t, &[x[0], x[1], x[2], x[3], 0.0, 0.0, 0.0, 0.0]);

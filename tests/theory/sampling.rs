@@ -4,9 +4,8 @@
 #![allow(clippy::print_stdout, reason = "the figures are read from the output")]
 
 use punctual_core::filter::{BarrierSettings, Sampling};
-use punctual_core::nalgebra::SVector;
+use punctual_core::plants::{PointMass, Unicycle};
 use punctual_reference::nominal::Heading;
-use punctual_reference::plants::{PointMass, Unicycle};
 
 use super::starts::{DEADLINE, assert_all_keep_the_deadline, drawn, quantile, starts};
 use super::{Nominal, Run, Scheme, bicycle, damp_speed, damp_velocity, distance, run_as};
@@ -15,9 +14,9 @@ type Kinds = [Nominal; 3];
 
 const DAMPING: Kinds = [damp_velocity, damp_speed, damp_speed];
 const HEADING: Kinds = [
-    |_, x| Heading::towards([45.0, 45.0]).point_mass(&(*x).into()).into(),
-    |_, x| Heading::towards([45.0, 45.0]).unicycle(&(*x).into()).into(),
-    |_, x| SVector::from(Heading::towards([45.0, 45.0]).bicycle(&(*x).into(), 10.0)),
+    |_, x| Heading::towards([45.0, 45.0]).point_mass(x),
+    |_, x| Heading::towards([45.0, 45.0]).unicycle(x),
+    |_, x| Heading::towards([45.0, 45.0]).bicycle(x, 10.0),
 ];
 
 /// Asserts that point mass, unicycle and bicycle are all on time and inside; returns the median peaks.

@@ -3,7 +3,7 @@
 use punctual::reproduce::starts::{self, hundred};
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{BarrierSettings, Method};
-use punctual_reference::plants::{PointMass, Unicycle};
+use punctual_core::plants::{PointMass, Unicycle};
 
 use super::{Nominal, Run, bicycle, coast, damp_speed, damp_velocity, distance, quadratic, run};
 

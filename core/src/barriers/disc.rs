@@ -1,7 +1,5 @@
 //! Discs: the paper's form and the distance-shaped one, at rest, moving, or around a point that is a state.
 
-use nalgebra::SVector;
-
 use crate::barrier::Barrier;
 use crate::dynamics::Region;
 use crate::elementary;
@@ -33,7 +31,7 @@ impl Centre {
 
     /// Squared distance of the position (the first two states) from the point at time `t`, in m².
     #[inline(always)]
-    fn distance_squared<S: Scalar, const NX: usize>(&self, t: S, x: &SVector<S, NX>) -> S {
+    fn distance_squared<S: Scalar, const NX: usize>(&self, t: S, x: &[S; NX]) -> S {
         let away = match self {
             // At rest there is nothing to multiply.
             Self::Given { start, velocity: [0.0, 0.0] } => [x[0] - start[0], x[1] - start[1]],
@@ -47,7 +45,7 @@ impl Centre {
 
     /// The time in s from `t` on at which the point is nearest to the position of `x`, which does not move; and whether it
     /// goes away from there for ever.
-    fn passes<const NX: usize>(&self, t: f64, x: &SVector<f64, NX>) -> (f64, bool) {
+    fn passes<const NX: usize>(&self, t: f64, x: &[f64; NX]) -> (f64, bool) {
         match self {
             Self::Given { start, velocity } if *velocity != [0.0; 2] => {
                 let way: f64 = (0..2).map(|i| (x[i] - start[i]) * velocity[i]).sum();
@@ -113,7 +111,7 @@ impl<const NX: usize> Barrier<NX> for QuadraticDisc {
     const BENDS_ONE_WAY: bool = true;
 
     #[inline(always)]
-    fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
+    fn value<S: Scalar>(&self, t: S, x: &[S; NX]) -> S {
         -self.centre.distance_squared(t, x) + self.radius * self.radius
     }
 
@@ -122,7 +120,7 @@ impl<const NX: usize> Barrier<NX> for QuadraticDisc {
         Some((self.radius - nearest) * (self.radius + nearest))
     }
 
-    fn range_from(&self, t: f64, x: &SVector<f64, NX>) -> Option<[f64; 2]> {
+    fn range_from(&self, t: f64, x: &[f64; NX]) -> Option<[f64; 2]> {
         let (nearest, leaves) = self.centre.passes(t, x);
         Some([if leaves { f64::NEG_INFINITY } else { self.value(t, x) }, self.value(nearest, x)])
     }
@@ -175,7 +173,7 @@ impl<const NX: usize> Barrier<NX> for DistanceDisc {
     const BENDS_ONE_WAY: bool = true;
 
     #[inline(always)]
-    fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
+    fn value<S: Scalar>(&self, t: S, x: &[S; NX]) -> S {
         -(self.centre.distance_squared(t, x) + self.smoothing * self.smoothing).sqrt() + self.level
     }
 
@@ -184,7 +182,7 @@ impl<const NX: usize> Barrier<NX> for DistanceDisc {
         Some(self.level - elementary::sqrt(nearest * nearest + self.smoothing * self.smoothing))
     }
 
-    fn range_from(&self, t: f64, x: &SVector<f64, NX>) -> Option<[f64; 2]> {
+    fn range_from(&self, t: f64, x: &[f64; NX]) -> Option<[f64; 2]> {
         let (nearest, leaves) = self.centre.passes(t, x);
         Some([if leaves { f64::NEG_INFINITY } else { self.value(t, x) }, self.value(nearest, x)])
     }

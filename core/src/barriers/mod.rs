@@ -20,8 +20,6 @@ mod shapes;
 pub use disc::{DistanceDisc, QuadraticDisc};
 pub use shapes::{Ellipse, HalfPlane, NormBound, Rectangle, StateBound};
 
-use nalgebra::SVector;
-
 use crate::barrier::Barrier;
 use crate::scalar::Scalar;
 
@@ -36,11 +34,11 @@ impl<B: Barrier<NX>, const NX: usize> Barrier<NX> for Outside<B> {
     const BENDS_ONE_WAY: bool = B::BENDS_ONE_WAY;
 
     #[inline(always)]
-    fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
+    fn value<S: Scalar>(&self, t: S, x: &[S; NX]) -> S {
         -self.0.value(t, x)
     }
 
-    fn range_from(&self, t: f64, x: &SVector<f64, NX>) -> Option<[f64; 2]> {
+    fn range_from(&self, t: f64, x: &[f64; NX]) -> Option<[f64; 2]> {
         self.0.range_from(t, x).map(|[least, largest]| [-largest, -least])
     }
 }

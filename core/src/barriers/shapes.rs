@@ -2,8 +2,6 @@
 
 use core::f64::consts::SQRT_2;
 
-use nalgebra::SVector;
-
 use crate::barrier::Barrier;
 use crate::dynamics::Region;
 use crate::elementary;
@@ -45,7 +43,7 @@ impl HalfPlane {
 impl<const NX: usize> Barrier<NX> for HalfPlane {
     const BENDS_ONE_WAY: bool = true;
 
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, NX>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; NX]) -> S {
         (x[0] - self.point[0]) * self.normal[0] + (x[1] - self.point[1]) * self.normal[1]
     }
 
@@ -70,7 +68,7 @@ impl Axes {
     }
 
     /// The position relative to the centre along the two axes, in m.
-    fn along<S: Scalar, const NX: usize>(&self, x: &SVector<S, NX>) -> [S; 2] {
+    fn along<S: Scalar, const NX: usize>(&self, x: &[S; NX]) -> [S; 2] {
         let (away, [c, s]) = ([x[0] - self.centre[0], x[1] - self.centre[1]], self.direction);
         [away[0] * c + away[1] * s, away[1] * c - away[0] * s]
     }
@@ -110,7 +108,7 @@ impl Ellipse {
 impl<const NX: usize> Barrier<NX> for Ellipse {
     const BENDS_ONE_WAY: bool = true;
 
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, NX>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; NX]) -> S {
         let [along, across] = self.axes.along(x);
         let [a, b] = self.half_axes;
         let level = (along / a).squared() + (across / b).squared();
@@ -155,7 +153,7 @@ impl Rectangle {
 impl<const NX: usize> Barrier<NX> for Rectangle {
     const BENDS_ONE_WAY: bool = true;
 
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, NX>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; NX]) -> S {
         let [along, across] = self.axes.along(x);
         let [a, b] = self.half_sides;
         let level = (along / a).squared().squared() + (across / b).squared().squared();
@@ -201,7 +199,7 @@ impl<const NX: usize> Barrier<NX> for StateBound {
     const BENDS_ONE_WAY: bool = true;
 
     /// Not a number for a state that the plant does not have.
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, NX>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; NX]) -> S {
         match x.get(self.state) {
             Some(value) => (*value - self.bound) * self.sign,
             None => S::from(f64::NAN),
@@ -247,7 +245,7 @@ impl<const NX: usize> Barrier<NX> for NormBound {
     const BENDS_ONE_WAY: bool = true;
 
     /// Not a number for states that the plant does not have.
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, NX>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; NX]) -> S {
         let smoothing = 0.5 * self.limit;
         if NX < self.count || self.first > NX - self.count {
             return S::from(f64::NAN);
@@ -262,7 +260,6 @@ impl<const NX: usize> Barrier<NX> for NormBound {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::vector;
 
     use alloc::borrow::ToOwned;
     use alloc::string::ToString;
@@ -270,7 +267,7 @@ mod tests {
     use super::*;
 
     fn h(barrier: &impl Barrier<4>, x: [f64; 4]) -> f64 {
-        barrier.value(0.0, &x.into())
+        barrier.value(0.0, &x)
     }
 
     #[test]
@@ -306,7 +303,7 @@ mod tests {
         let speed = NormBound::new(2, 5.0).expect("valid");
         assert!(h(&speed, x).abs() < 1e-15 && h(&speed, [0.0; 4]) > 0.0);
         assert_eq!(h(&NormBound::of_one(3, 4.0).expect("valid"), x), 0.0);
-        assert!(Barrier::<3>::value(&speed, 0.0, &vector![0.0, 0.0, 1.0]).is_nan());
+        assert!(Barrier::<3>::value(&speed, 0.0, &[0.0, 0.0, 1.0]).is_nan());
     }
 
     #[test]

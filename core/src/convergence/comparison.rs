@@ -66,7 +66,7 @@ pub fn lower_terms(rate: f64, e: &[f64]) -> f64 {
 
 /// A_k = k! c_k = Σ_{j≤k} C(k, j) a^{k−j} e⁽ʲ⁾(0) for `k` below the length of `e`.
 #[inline(always)]
-pub fn scaled_coefficient(rate: f64, e: &[f64], k: usize) -> f64 {
+pub(super) fn scaled_coefficient(rate: f64, e: &[f64], k: usize) -> f64 {
     let mut sum = 0.0;
     for j in 0..k + 1 {
         sum = sum * rate + binomial(k, j) * e[j];

@@ -129,7 +129,7 @@ impl FixedTime {
     }
 
     /// Whether a constraint of one's own is in force ([`Self::with_condition`]).
-    pub fn has_condition(&self) -> bool {
+    pub(crate) fn has_condition(&self) -> bool {
         self.approach.is_own()
     }
 
@@ -138,7 +138,7 @@ impl FixedTime {
     /// # Errors
     ///
     /// A deadline that is not finite or ≤ 0.
-    pub fn with_deadline(mut self, deadline: f64) -> Result<Self, Error> {
+    pub(crate) fn with_deadline(mut self, deadline: f64) -> Result<Self, Error> {
         self.settings.deadline = Some(positive("deadline", deadline)?);
         Ok(self)
     }
@@ -171,7 +171,7 @@ impl FixedTime {
 
     /// As [`Self::advance`], where h⁽ᵏ⁾ is known to `errors[k]` ≥ 0. A theorem starts from the smallest derivatives
     /// there can be, and ends where h < 0 for certain. Arrival stays that of `h` as it is given.
-    pub fn advance_within(
+    pub(crate) fn advance_within(
         &self,
         state: &mut FixedTimeState,
         t: f64,
@@ -182,7 +182,7 @@ impl FixedTime {
     }
 
     /// As [`Self::advance_within`], with the stay rate chosen for what plant and inputs can do (`means`).
-    pub fn advance_by(
+    pub(crate) fn advance_by(
         &self,
         state: &mut FixedTimeState,
         t: f64,
@@ -281,7 +281,7 @@ impl FixedTime {
     }
 
     /// Whether the condition allows for errors of the derivatives ([`Self::advance_within`]).
-    pub fn allows_errors(&self) -> bool {
+    pub(crate) fn allows_errors(&self) -> bool {
         self.approach.abilities().allows_errors
     }
 
@@ -385,7 +385,7 @@ impl FixedTime {
     /// become what they would have been had it been known at the anchor. With the reference profile h − μ − r
     /// changes by at most C(2n − 1, n) (elapsed/T)ⁿ times the change of the margin (`docs/theory.md#period`). Other
     /// methods take none.
-    pub fn resample(&self, state: &mut FixedTimeState, period: f64) {
+    pub(crate) fn resample(&self, state: &mut FixedTimeState, period: f64) {
         if !self.approach.abilities().covers_holds {
             return;
         }
@@ -402,7 +402,7 @@ impl FixedTime {
     ///
     /// It does not shortly before the deadline, where a profile from anywhere would ask for any input, nor along a
     /// profile of one's own, whose check takes long.
-    pub fn restart(&self, state: &mut FixedTimeState, t: f64, h: &[f64], period: f64) -> bool {
+    pub(crate) fn restart(&self, state: &mut FixedTimeState, t: f64, h: &[f64], period: f64) -> bool {
         /// Samples, and part of the configured deadline, that must be left.
         const SAMPLES: f64 = 10.0;
         const PART: f64 = 0.05;

@@ -128,7 +128,7 @@ impl Operator {
 
 impl Operator {
     /// The largest μ, negative where there is none ≥ 0, for which e − μ satisfies [`Self::is_invariant`] from `e`.
-    pub fn affordable_margin(&self, e: &[f64]) -> f64 {
+    pub(super) fn affordable_margin(&self, e: &[f64]) -> f64 {
         let mut cascade = [0.0; MAX_RELATIVE_DEGREE];
         cascade[..self.n].copy_from_slice(&e[..self.n]);
         let (mut least, mut product) = (f64::INFINITY, 1.0);

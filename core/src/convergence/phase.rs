@@ -53,18 +53,8 @@ impl Phase {
     }
 
     /// Whether the set is to be kept now, so that the stay constraint is in force.
-    pub fn keeps(self) -> bool {
+    pub(super) fn keeps(self) -> bool {
         matches!(self, Self::Stay | Self::Left)
-    }
-
-    /// Whether the set is still to be reached.
-    pub fn approaches(self) -> bool {
-        matches!(self, Self::Approach | Self::Late)
-    }
-
-    /// Whether a constraint is in force.
-    pub fn is_in_force(self) -> bool {
-        !matches!(self, Self::Waiting | Self::Released)
     }
 }
 

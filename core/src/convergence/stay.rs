@@ -19,7 +19,7 @@
 //! falls with a: a larger rate brakes later and harder. [`keep`] takes the gentle one where it can. It takes a larger
 //! one where the gentle one asks for what the inputs cannot give and nothing is about to be left.
 //!
-//! With e = h − μ, all A_k(a) ≥ 0 says μ ≤ A_k(a; h)/aᵏ for all k < n. The least of them, [`affordable_margin`], is the
+//! With e = h − μ, all A_k(a) ≥ 0 says μ ≤ A_k(a; h)/aᵏ for all k < n. The least of them, `affordable_margin`, is the
 //! largest margin with which the condition holds.
 
 use core::array::from_fn;
@@ -69,7 +69,7 @@ pub fn smallest_rate(e: &[f64]) -> Option<f64> {
 /// The largest μ for which h − μ satisfies [`is_invariant`] with `rate` > 0; negative where none ≥ 0 does. `h` holds
 /// h⁽⁰⁾ … h⁽ⁿ⁻¹⁾.
 #[inline]
-pub fn affordable_margin(rate: f64, h: &[f64]) -> f64 {
+pub(super) fn affordable_margin(rate: f64, h: &[f64]) -> f64 {
     let (mut least, mut power) = (h[0], 1.0);
     for k in 1..h.len() {
         power *= rate;

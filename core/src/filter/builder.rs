@@ -5,8 +5,6 @@ use alloc::boxed::Box;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use nalgebra::SVector;
-
 use super::rows::{self, BarrierSlot, MeasurementErrors, Rows, Scratch, SharedPlants, Workspace};
 use super::{BarrierSettings, Begin, End, Filter, FilterState, Report, Sampling, Strictness};
 use crate::barrier::Barrier;
@@ -64,7 +62,7 @@ impl FilterBuilder {
     ///
     /// ```
     /// # use punctual_core::{barriers::DistanceDisc, filter::*};
-    /// # use punctual_reference::plants::SmallSlipBicycle;
+    /// # use punctual_core::plants::SmallSlipBicycle;
     /// let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
     /// let refused = Filter::builder(4, 2)
     ///     .barrier("goal", SmallSlipBicycle::new(10.0)?, goal, BarrierSettings::within(10.0))
@@ -109,7 +107,7 @@ impl FilterBuilder {
         name: &str,
         plant: P,
         barrier: B,
-        (n, samples): (usize, &[SVector<f64, NX>]),
+        (n, samples): (usize, &[[f64; NX]]),
         settings: BarrierSettings,
     ) -> Result<Self, Error>
     where
@@ -148,7 +146,7 @@ impl FilterBuilder {
     ///
     /// ```
     /// # use punctual_core::{barriers::DistanceDisc, convergence::profile::Hermite, filter::*};
-    /// # use punctual_reference::plants::PointMass;
+    /// # use punctual_core::plants::PointMass;
     /// use punctual_core::convergence::profile::Profile;
     ///
     /// // Arrive in nine tenths of the time.
@@ -177,7 +175,7 @@ impl FilterBuilder {
     ///
     /// ```
     /// # use punctual_core::{barriers::DistanceDisc, filter::*};
-    /// # use punctual_reference::plants::PointMass;
+    /// # use punctual_core::plants::PointMass;
     /// use punctual_reference::baselines::Exponential;
     ///
     /// let filter = Filter::builder(4, 2)
@@ -199,7 +197,7 @@ impl FilterBuilder {
     ///
     /// ```
     /// # use punctual_core::{barriers::DistanceDisc, filter::*};
-    /// # use punctual_reference::plants::PointMass;
+    /// # use punctual_core::plants::PointMass;
     /// // In A by 5 s, then in B by 10 s.
     /// let disc = |x| DistanceDisc::new([x, 0.0], 2.0, 2.0);
     /// let filter = Filter::builder(4, 2)

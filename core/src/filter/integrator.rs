@@ -17,7 +17,7 @@ use crate::qp::Bounds;
 ///
 /// ```
 /// # use punctual_core::{barriers::DistanceDisc, filter::*};
-/// # use punctual_reference::plants::SmallSlipBicycle;
+/// # use punctual_core::plants::SmallSlipBicycle;
 /// let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
 /// let model = SmallSlipBicycle::new(10.0)?.with_rate();
 /// // β, the last state, is the integral of input 1, and within 0.5 rad.

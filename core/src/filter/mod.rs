@@ -120,7 +120,7 @@ impl Filter {
     ///
     /// ```
     /// # use punctual_core::{barriers::DistanceDisc, filter::*};
-    /// # use punctual_reference::plants::PointMass;
+    /// # use punctual_core::plants::PointMass;
     /// let mut filter = Filter::builder(4, 2)
     ///     .barrier("goal", PointMass, DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
     ///     .build()?;
@@ -274,7 +274,7 @@ impl Filter {
     ///
     /// ```
     /// # use punctual_core::{barriers::DistanceDisc, filter::*, lie::Direction};
-    /// # use punctual_reference::plants::PointMass;
+    /// # use punctual_core::plants::PointMass;
     /// let mut filter = Filter::builder(4, 2)
     ///     .barrier("goal", PointMass, DistanceDisc::new([45.0, 0.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
     ///     .build()?;

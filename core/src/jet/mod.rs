@@ -1,7 +1,7 @@
 //! Forward-mode derivatives: first order in directions ([`Dual`]), any order in time ([`Taylor`]).
 //!
 //! `Taylor<Dual<M>, K>` holds the first `K` Taylor coefficients of a function of time, each with its
-//! exact derivative along `M` directions (here: the inputs). [`Response`] is the same where the first
+//! exact derivative along `M` directions (here: the inputs). `Response` is the same where the first
 //! coefficient depends on none of them, at a fraction of the work; [`Tangent`] adds one direction to any of
 //! them. No finite differences anywhere.
 
@@ -11,7 +11,7 @@ mod tangent;
 mod taylor;
 
 pub use dual::Dual;
-pub use response::Response;
+pub(crate) use response::Response;
 pub use tangent::Tangent;
 pub use taylor::Taylor;
 

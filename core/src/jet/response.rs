@@ -24,22 +24,22 @@ type Gradient<const M: usize, const K: usize> = [[f64; M]; K];
 
 /// The first `K` ≥ 1 Taylor coefficients at u = 0, and their derivatives along `M` inputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Response<const M: usize, const K: usize> {
+pub(crate) struct Response<const M: usize, const K: usize> {
     /// The series at u = 0.
-    pub series: Taylor<f64, K>,
+    pub(crate) series: Taylor<f64, K>,
     gradient: Gradient<M, K>,
 }
 
 impl<const M: usize, const K: usize> Response<M, K> {
     /// A series that no input reaches.
     #[inline(always)]
-    pub fn unforced(series: Taylor<f64, K>) -> Self {
+    pub(crate) fn unforced(series: Taylor<f64, K>) -> Self {
         Self { series, gradient: [[0.0; M]; K] }
     }
 
     /// Time itself at `t`: `t + τ`.
     #[inline(always)]
-    pub fn time(t: f64) -> Self {
+    pub(crate) fn time(t: f64) -> Self {
         Self::unforced(Taylor::time(t))
     }
 
@@ -49,7 +49,7 @@ impl<const M: usize, const K: usize> Response<M, K> {
     ///
     /// If `k` ≥ `K`.
     #[inline(always)]
-    pub fn coefficient(&self, k: usize) -> (f64, [f64; M]) {
+    pub(crate) fn coefficient(&self, k: usize) -> (f64, [f64; M]) {
         (self.series.coefficients[k], if k == 0 { [0.0; M] } else { self.gradient[k] })
     }
 
@@ -59,7 +59,7 @@ impl<const M: usize, const K: usize> Response<M, K> {
     ///
     /// If `k` is 0 or ≥ `K`.
     #[inline(always)]
-    pub fn set_coefficient(&mut self, k: usize, (value, gradient): (f64, [f64; M])) {
+    pub(crate) fn set_coefficient(&mut self, k: usize, (value, gradient): (f64, [f64; M])) {
         assert!(k > 0, "the start does not depend on the inputs");
         self.series.coefficients[k] = value;
         self.gradient[k] = gradient;
@@ -67,7 +67,7 @@ impl<const M: usize, const K: usize> Response<M, K> {
 
     /// The first `J` ≤ `K` coefficients.
     #[inline(always)]
-    pub fn truncated<const J: usize>(&self) -> Response<M, J> {
+    pub(crate) fn truncated<const J: usize>(&self) -> Response<M, J> {
         Response {
             series: Taylor { coefficients: from_fn(|k| self.series.coefficients[k]) },
             gradient: from_fn(|k| self.gradient[k]),

@@ -13,11 +13,11 @@
 //! [`SUBSTEPS`] are taken. (4) is the exact derivative of what is computed, so Newton's method on it converges
 //! quadratically.
 
-use nalgebra::SVector;
+use core::array::from_fn;
 
 use super::{COURSE, Course, CourseOver, Direction, RateOver, enclosure};
 use crate::barrier::Barrier;
-use crate::dynamics::{ControlAffine, column, rk4};
+use crate::dynamics::{ControlAffine, first, rk4};
 use crate::interval::Interval;
 use crate::jet::{Dual, Tangent, Taylor};
 use crate::scalar::{Scalar, all_finite};
@@ -62,11 +62,11 @@ impl Ahead {
 /// classical Runge-Kutta method; as [`rk4_step`](crate::dynamics::rk4_step), for any scalar.
 pub fn flow<P, S, const NX: usize, const NU: usize>(
     plant: &P,
-    x: &SVector<S, NX>,
-    u: &SVector<S, NU>,
+    x: &[S; NX],
+    u: &[S; NU],
     duration: f64,
     steps: usize,
-) -> SVector<S, NX>
+) -> [S; NX]
 where
     P: ControlAffine<NX, NU>,
     S: Scalar,
@@ -109,11 +109,7 @@ pub fn is_even<S: Scalar>([k1, k2, k3, k4]: [&[S]; 4]) -> bool {
 
 /// The rates of the states as numbers that carry derivatives along u: f(x) + g(x) u, by the product rule. `x` carries its own.
 #[inline(always)]
-fn rate<P, const NX: usize, const NU: usize>(
-    plant: &P,
-    x: &SVector<Dual<NU>, NX>,
-    u: &[f64; NU],
-) -> SVector<Dual<NU>, NX>
+fn rate<P, const NX: usize, const NU: usize>(plant: &P, x: &[Dual<NU>; NX], u: &[f64; NU]) -> [Dual<NU>; NX]
 where
     P: ControlAffine<NX, NU>,
 {
@@ -121,7 +117,7 @@ where
     for m in 0..NU {
         for i in 0..NX {
             // What is constantly zero or one is known to the compiler.
-            let Dual { value, gradient } = &g[(i, m)];
+            let Dual { value, gradient } = &g[i][m];
             if *value != 0.0 {
                 rate[i].value += value * u[m];
                 rate[i].gradient[m] += value;
@@ -139,15 +135,15 @@ where
 /// The stages of one Runge-Kutta step of `duration`, from the first on.
 #[inline(always)]
 fn stages<S, const NX: usize>(
-    rate: &impl Fn(&SVector<S, NX>) -> SVector<S, NX>,
-    x: &SVector<S, NX>,
-    k1: &SVector<S, NX>,
+    rate: &impl Fn(&[S; NX]) -> [S; NX],
+    x: &[S; NX],
+    k1: &[S; NX],
     duration: f64,
-) -> [SVector<S, NX>; 4]
+) -> [[S; NX]; 4]
 where
     S: Scalar,
 {
-    let moved = |k: &SVector<S, NX>, by: f64| {
+    let moved = |k: &[S; NX], by: f64| {
         let mut moved = *x;
         for i in 0..NX {
             moved[i] += k[i] * by;
@@ -162,11 +158,7 @@ where
 
 /// The state after the Runge-Kutta step of those stages.
 #[inline(always)]
-fn stepped<S, const NX: usize>(
-    x: &SVector<S, NX>,
-    [k1, k2, k3, k4]: &[SVector<S, NX>; 4],
-    duration: f64,
-) -> SVector<S, NX>
+fn stepped<S, const NX: usize>(x: &[S; NX], [k1, k2, k3, k4]: &[[S; NX]; 4], duration: f64) -> [S; NX]
 where
     S: Scalar,
 {
@@ -181,11 +173,11 @@ where
 /// [`SUBSTEPS`].
 #[inline(always)]
 fn run<S, const NX: usize>(
-    rate: impl Fn(&SVector<S, NX>) -> SVector<S, NX>,
-    x: &SVector<S, NX>,
-    k1: &SVector<S, NX>,
+    rate: impl Fn(&[S; NX]) -> [S; NX],
+    x: &[S; NX],
+    k1: &[S; NX],
     duration: f64,
-) -> SVector<S, NX>
+) -> [S; NX]
 where
     S: Scalar,
 {
@@ -199,11 +191,11 @@ where
 /// The same by [`SUBSTEPS`], apart from what short periods take.
 #[inline(never)]
 fn run_in_parts<S, const NX: usize>(
-    rate: &impl Fn(&SVector<S, NX>) -> SVector<S, NX>,
-    x: &SVector<S, NX>,
-    k1: &SVector<S, NX>,
+    rate: &impl Fn(&[S; NX]) -> [S; NX],
+    x: &[S; NX],
+    k1: &[S; NX],
     duration: f64,
-) -> SVector<S, NX>
+) -> [S; NX]
 where
     S: Scalar,
 {
@@ -223,22 +215,22 @@ where
 #[inline(never)]
 fn arrival<P, const NX: usize, const NU: usize>(
     plant: &P,
-    x: &SVector<f64, NX>,
+    x: &[f64; NX],
     u: &[f64; NU],
     duration: f64,
-) -> SVector<Dual<NU>, NX>
+) -> [Dual<NU>; NX]
 where
     P: ControlAffine<NX, NU>,
 {
-    let from = SVector::<Dual<NU>, NX>::from_fn(|i, _| Dual::from(x[i]));
+    let from = from_fn::<Dual<NU>, NX, _>(|i| Dual::from(x[i]));
     if duration == 0.0 {
         return from;
     }
     // The first stage depends on u through g(x) alone.
     let (f, g) = (plant.drift(x), plant.input_map(x));
-    let k1 = SVector::<Dual<NU>, NX>::from_fn(|i, _| Dual {
-        value: (0..NU).fold(f[i], |sum, m| if g[(i, m)] == 0.0 { sum } else { sum + g[(i, m)] * u[m] }),
-        gradient: core::array::from_fn(|m| g[(i, m)]),
+    let k1 = from_fn::<Dual<NU>, NX, _>(|i| Dual {
+        value: (0..NU).fold(f[i], |sum, m| if g[i][m] == 0.0 { sum } else { sum + g[i][m] * u[m] }),
+        gradient: from_fn(|m| g[i][m]),
     });
     run(|x| rate(plant, x, u), &from, &k1, duration)
 }
@@ -247,17 +239,17 @@ where
 #[inline(never)]
 fn arrival_alone<P, const NX: usize, const NU: usize>(
     plant: &P,
-    x: &SVector<f64, NX>,
-    u: &SVector<f64, NU>,
+    x: &[f64; NX],
+    u: &[f64; NU],
     duration: f64,
-) -> SVector<f64, NX>
+) -> [f64; NX]
 where
     P: ControlAffine<NX, NU>,
 {
     if duration == 0.0 {
         return *x;
     }
-    let rate = |x: &SVector<f64, NX>| plant.derivative(x, u);
+    let rate = |x: &[f64; NX]| plant.derivative(x, u);
     run(rate, x, &rate(x), duration)
 }
 
@@ -265,16 +257,16 @@ where
 #[inline(always)]
 fn series<P, S, const NX: usize, const NU: usize, const K: usize>(
     plant: &P,
-    x: &SVector<S, NX>,
-    u: &SVector<S, NU>,
-) -> SVector<Taylor<S, K>, NX>
+    x: &[S; NX],
+    u: &[S; NU],
+) -> [Taylor<S, K>; NX]
 where
     P: ControlAffine<NX, NU>,
     S: Scalar,
 {
     const { assert!(K <= MAX_RELATIVE_DEGREE + 1, "orders 1 to 8 are spelled out below") };
     // In place, since the compiler moves what a closure makes.
-    let mut series = SVector::from([Taylor { coefficients: [S::zero(); K] }; NX]);
+    let mut series = [Taylor { coefficients: [S::zero(); K] }; NX];
     for i in 0..NX {
         series[i].coefficients[0] = x[i];
     }
@@ -282,14 +274,14 @@ where
         ($($j:literal),*) => {
             $(if const { $j < K } {
                 // Every series is cut off after its last known coefficient.
-                let known = SVector::<Taylor<S, $j>, NX>::from_fn(|i, _| Taylor {
-                    coefficients: core::array::from_fn(|k| series[i].coefficients[k]),
+                let known = from_fn::<Taylor<S, $j>, NX, _>(|i| Taylor {
+                    coefficients: from_fn(|k| series[i].coefficients[k]),
                 });
                 let (f, g) = (plant.drift(&known), plant.input_map(&known));
                 for i in 0..NX {
                     let mut rate = f[i].coefficients[$j - 1];
                     for m in 0..NU {
-                        let g = g[(i, m)].coefficients[$j - 1];
+                        let g = g[i][m].coefficients[$j - 1];
                         if !g.is_zero() {
                             rate += g * u[m];
                         }
@@ -308,23 +300,23 @@ where
 #[inline(never)]
 pub(super) fn path<P, const NX: usize, const NU: usize>(
     plant: &P,
-    x: &SVector<f64, NX>,
+    x: &[f64; NX],
     u: &[f64],
     out: &mut [Course],
 ) where
     P: ControlAffine<NX, NU>,
 {
-    let mut path = SVector::<Taylor<f64, COURSE>, NX>::from_fn(|i, _| Taylor::constant(x[i]));
+    let mut path = from_fn::<Taylor<f64, COURSE>, NX, _>(|i| Taylor::constant(x[i]));
     macro_rules! extend_to {
         ($($j:literal),*) => {{
             const { assert!([$($j),*].len() == COURSE - 1, "an order each") };
             $({
-                let known = SVector::<Taylor<f64, $j>, NX>::from_fn(|i, _| path[i].truncated());
+                let known = from_fn::<Taylor<f64, $j>, NX, _>(|i| path[i].truncated());
                 let (f, g) = (plant.drift(&known), plant.input_map(&known));
                 for i in 0..NX {
                     let mut rate = f[i].coefficients[$j - 1];
                     for m in 0..NU {
-                        rate += g[(i, m)].coefficients[$j - 1] * u[m];
+                        rate += g[i][m].coefficients[$j - 1] * u[m];
                     }
                     path[i].coefficients[$j] = rate * (1.0 / f64::from($j));
                 }
@@ -343,14 +335,14 @@ pub(super) fn value_along<B, const NX: usize>(barrier: &B, t: f64, path: &[Cours
 where
     B: Barrier<NX>,
 {
-    let states = SVector::<Taylor<f64, COURSE>, NX>::from_fn(|i, _| Taylor { coefficients: path[i] });
+    let states = from_fn::<Taylor<f64, COURSE>, NX, _>(|i| Taylor { coefficients: path[i] });
     barrier.value(Taylor::time(t), &states).coefficients
 }
 
 /// The first `K` coefficients of the courses of the states.
 #[inline(always)]
-fn first_over<const NX: usize, const K: usize>(path: &[CourseOver]) -> SVector<Taylor<Interval, K>, NX> {
-    SVector::from_fn(|i, _| Taylor { coefficients: core::array::from_fn(|k| path[i][k]) })
+fn first_over<const NX: usize, const K: usize>(path: &[CourseOver]) -> [Taylor<Interval, K>; NX] {
+    from_fn(|i| Taylor { coefficients: from_fn(|k| path[i][k]) })
 }
 
 /// Writes the first `K` coefficients of the rate of `plant` under `u` on enclosures of the courses of the states. Once for a
@@ -368,7 +360,7 @@ pub(super) fn rates_over<P, const NX: usize, const NU: usize, const K: usize>(
     let (f, g) = (plant.drift(&states), plant.input_map(&states));
     for (i, out) in out.iter_mut().enumerate() {
         for (k, out) in out.iter_mut().enumerate().take(K) {
-            let driven = u.iter().enumerate().map(|(m, &u)| g[(i, m)].coefficients[k] * u);
+            let driven = u.iter().enumerate().map(|(m, &u)| g[i][m].coefficients[k] * u);
             *out = driven.fold(f[i].coefficients[k], |sum, term| sum + term);
         }
     }
@@ -380,7 +372,7 @@ pub(super) fn value_over<B, const NX: usize>(barrier: &B, time: Interval, path: 
 where
     B: Barrier<NX>,
 {
-    barrier.value(time, &SVector::from_fn(|i, _| path[i][0]))
+    barrier.value(time, &from_fn(|i| path[i][0]))
 }
 
 /// The last coefficient of the course of `barrier` on enclosures of time and of those of the states. Once for a barrier.
@@ -415,26 +407,25 @@ where
     P: ControlAffine<NX, NU>,
     B: Barrier<NX>,
 {
-    let (x, u) = (column::<f64, NX>(x), column::<f64, NU>(u));
+    let (x, u) = (first::<f64, NX>(x), first::<f64, NU>(u));
     let mut states = [[Interval::ALL; 2]; NX];
-    let known =
-        enclosure::enclose(x.as_slice(), dt, plant.derivative(&x, &u).as_slice(), &mut states, |states| {
-            let over = SVector::<_, NX>::from_fn(|i, _| states[i][0]);
-            let (f, g) = (plant.drift(&over), plant.input_map(&over));
-            for (i, [_, rate]) in states.iter_mut().enumerate() {
-                let inputs = (0..NU).filter(|m| g[(i, *m)] != Interval::from(0.0));
-                *rate = inputs.fold(f[i], |sum, m| sum + g[(i, m)] * u[m]);
-            }
-        });
+    let known = enclosure::enclose(&x, dt, &plant.derivative(&x, &u), &mut states, |states| {
+        let over = from_fn::<_, NX, _>(|i| states[i][0]);
+        let (f, g) = (plant.drift(&over), plant.input_map(&over));
+        for (i, [_, rate]) in states.iter_mut().enumerate() {
+            let inputs = (0..NU).filter(|m| g[i][*m] != Interval::from(0.0));
+            *rate = inputs.fold(f[i], |sum, m| sum + g[i][m] * u[m]);
+        }
+    });
     if !known {
         return f64::NEG_INFINITY;
     }
     let time = Interval::new(t, t + dt);
-    let low = barrier.value(time, &SVector::from_fn(|i, _| states[i][0])).low;
+    let low = barrier.value(time, &from_fn(|i| states[i][0])).low;
     if low >= wanted {
         return low;
     }
-    let course = SVector::<_, NX>::from_fn(|i, _| Taylor { coefficients: states[i] });
+    let course = from_fn::<_, NX, _>(|i| Taylor { coefficients: states[i] });
     let slope = barrier.value(time_over::<2>(time), &course).coefficients[1];
     enclosure::sharper(low, barrier.value(t, &x), slope, dt)
 }
@@ -446,13 +437,13 @@ pub(super) fn motion<P, const NX: usize, const NU: usize, const K: usize>(
     x: &[f64],
     u: &[f64],
     duration: f64,
-) -> SVector<Taylor<Dual<NU>, K>, NX>
+) -> [Taylor<Dual<NU>, K>; NX]
 where
     P: ControlAffine<NX, NU>,
 {
-    let held: [f64; NU] = core::array::from_fn(|i| u[i]);
-    let x = arrival(plant, &column(x), &held, duration);
-    series(plant, &x, &SVector::from_fn(|i, _| Dual::variable(held[i], i)))
+    let held: [f64; NU] = from_fn(|i| u[i]);
+    let x = arrival(plant, &first(x), &held, duration);
+    series(plant, &x, &from_fn(|i| Dual::variable(held[i], i)))
 }
 
 /// Evaluates (4) for `barrier` at time `t` along the [`motion`] from there, for k < `K`. Leaves the rest of `out` as it is.
@@ -460,7 +451,7 @@ where
 pub(super) fn evaluate<B, const NX: usize, const NU: usize, const K: usize>(
     barrier: &B,
     t: f64,
-    motion: &SVector<Taylor<Dual<NU>, K>, NX>,
+    motion: &[Taylor<Dual<NU>, K>; NX],
     out: &mut Ahead,
 ) where
     B: Barrier<NX>,
@@ -485,8 +476,8 @@ pub(super) fn values<P, B, const NX: usize, const NU: usize, const K: usize>(
     P: ControlAffine<NX, NU>,
     B: Barrier<NX>,
 {
-    let u = column::<f64, NU>(u);
-    let x = arrival_alone(plant, &column(x), &u, duration);
+    let u = first::<f64, NU>(u);
+    let x = arrival_alone(plant, &first(x), &u, duration);
     let h: Taylor<_, K> = barrier.value(Taylor::time(t + duration), &series(plant, &x, &u));
     for (k, out) in out[..K].iter_mut().enumerate() {
         *out = h.derivative(k);
@@ -507,14 +498,12 @@ pub(super) fn differentiate<P, B, const NX: usize, const NU: usize, const K: usi
 {
     let Direction { x: dx, u: du } = direction;
     type Second<const NU: usize> = Tangent<Dual<NU>>;
-    let u = SVector::<Second<NU>, NU>::from_fn(|i, _| Tangent {
+    let u = from_fn::<Second<NU>, NU, _>(|i| Tangent {
         value: Dual::variable(u[i], i),
         directional: Dual::from(du[i]),
     });
-    let x = SVector::<Second<NU>, NX>::from_fn(|i, _| Tangent {
-        value: Dual::from(x[i]),
-        directional: Dual::from(dx[i]),
-    });
+    let x =
+        from_fn::<Second<NU>, NX, _>(|i| Tangent { value: Dual::from(x[i]), directional: Dual::from(dx[i]) });
     let x = flow(plant, &x, &u, duration, SUBSTEPS);
     let h: Taylor<_, K> = barrier.value(Taylor::time(t + duration), &series(plant, &x, &u));
     out.write((0..K).map(|k| h.derivative(k).directional));
@@ -530,8 +519,8 @@ pub(super) fn flow_directional<P, const NX: usize, const NU: usize>(
 ) where
     P: ControlAffine<NX, NU>,
 {
-    let from = SVector::<Tangent<f64>, NX>::from_fn(|i, _| Tangent { value: x[i], directional: dx[i] });
-    let held = SVector::<Tangent<f64>, NU>::from_fn(|i, _| Tangent::from(u[i]));
+    let from = from_fn::<Tangent<f64>, NX, _>(|i| Tangent { value: x[i], directional: dx[i] });
+    let held = from_fn::<Tangent<f64>, NU, _>(|i| Tangent::from(u[i]));
     let to = flow(plant, &from, &held, duration, SUBSTEPS);
     for i in 0..NX {
         (x[i], dx[i]) = (to[i].value, to[i].directional);

@@ -5,18 +5,16 @@
 //! that enter at *different* orders are not harmless. A row on h⁽ⁿ⁾ with the lower n uses only the input that comes
 //! first; with the higher n it is wrong.
 //!
-//! The orders are read off the gradients of [`barrier_series`] at sample states. At a sample a gradient may vanish by
+//! The orders are read off the gradients of `barrier_series` at sample states. At a sample a gradient may vanish by
 //! accident: at the centre of a disc, or standing still. So where an order is not the lowest found, two neighbours of
 //! the sample are asked as well.
 
 use alloc::vec::Vec;
 use core::array::from_fn;
 
-use nalgebra::SVector;
-
 use super::barrier_series;
 use crate::barrier::Barrier;
-use crate::dynamics::ControlAffine;
+use crate::dynamics::{ControlAffine, first as first_of};
 use crate::elementary;
 use crate::error::{Error, ErrorKind, RelativeDegree};
 use crate::jet::Response;
@@ -67,11 +65,10 @@ impl RelativeDegree {
 /// ```
 /// use punctual_core::barriers::DistanceDisc;
 /// use punctual_core::lie::{RelativeDegree, relative_degree};
-/// use punctual_core::nalgebra::{self, vector};
-/// use punctual_reference::plants::{SmallSlipBicycle, Unicycle};
+/// use punctual_core::plants::{SmallSlipBicycle, Unicycle};
 ///
 /// let disc = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
-/// let x = [vector![1.0, 2.0, 0.3, 4.0]];
+/// let x = [[1.0, 2.0, 0.3, 4.0]];
 /// assert_eq!(relative_degree(&Unicycle, &disc, 0.0, &x), RelativeDegree::Uniform(2));
 /// // Acceleration enters the second derivative of a distance, the slip angle already the first.
 /// let bicycle = SmallSlipBicycle::new(10.0)?;
@@ -83,17 +80,17 @@ pub fn relative_degree<P, B, const NX: usize, const NU: usize>(
     plant: &P,
     barrier: &B,
     t: f64,
-    samples: &[SVector<f64, NX>],
+    samples: &[[f64; NX]],
 ) -> RelativeDegree
 where
     P: ControlAffine<NX, NU>,
     B: Barrier<NX>,
 {
-    let samples = samples.iter().map(|x| (t, x.as_slice().to_vec()));
+    let samples = samples.iter().map(|x| (t, x.to_vec()));
     relative_degree_of(NU, samples, |t, x| coefficients(plant, barrier, t, x))
 }
 
-/// The relative degree found on built-in samples: [`samples`] of states without a range.
+/// The relative degree found on built-in samples of states without a range.
 pub fn detected<P, B, const NX: usize, const NU: usize>(plant: &P, barrier: &B) -> RelativeDegree
 where
     P: ControlAffine<NX, NU>,
@@ -147,7 +144,7 @@ where
     P: ControlAffine<NX, NU>,
     B: Barrier<NX>,
 {
-    let series: Response<NU, K> = barrier_series(plant, barrier, t, &SVector::from_column_slice(x));
+    let series: Response<NU, K> = barrier_series(plant, barrier, t, &first_of(x));
     from_fn(|k| {
         let (value, gradient) = series.coefficient(k);
         (value, from_fn(|i| gradient.get(i).copied().unwrap_or_default()))

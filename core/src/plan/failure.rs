@@ -1,4 +1,7 @@
-//! Why there is no plan.
+//! Why there is no plan, and that in words.
+
+use alloc::string::{String, ToString};
+use core::fmt;
 
 /// What keeps a list of inputs from being a witness.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,4 +52,125 @@ pub enum Failure {
         /// The number of its barrier.
         barrier: usize,
     },
+}
+
+/// What the words of a [`Failure`] name, which knows of barriers only by their numbers.
+pub trait Names {
+    /// The name of a barrier.
+    fn barrier(&self, barrier: usize) -> String {
+        format!("barrier {barrier}")
+    }
+
+    /// A difference of h of a barrier, with its unit.
+    fn amount(&self, _barrier: usize, value: f64) -> String {
+        value.to_string()
+    }
+
+    /// A time in s, without the unit.
+    fn time(&self, time: f64) -> String {
+        time.to_string()
+    }
+
+    /// That no state meets two barriers.
+    fn apart(&self, barriers: [usize; 2]) -> String {
+        let [first, second] = barriers.map(|barrier| self.barrier(barrier));
+        format!("no state is in both {first} and {second}")
+    }
+}
+
+/// Barriers by their numbers, counted from 0 as everywhere in a filter.
+struct Numbers;
+
+impl Names for Numbers {}
+
+impl Failure {
+    /// It in words, with the names of `names`.
+    pub fn named(self, names: &dyn Names) -> impl fmt::Display {
+        Named { failure: self, names }
+    }
+}
+
+/// A failure with names for what is in it.
+struct Named<'a> {
+    failure: Failure,
+    names: &'a dyn Names,
+}
+
+impl fmt::Display for Named<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { failure, names } = *self;
+        match failure {
+            Failure::Broken { barrier, time, slack } => {
+                let (name, missing) = (names.barrier(barrier), names.amount(barrier, -slack));
+                write!(f, "{name} is not met at {} s, by {missing}", names.time(time))
+            }
+            Failure::Drift { barrier, time, slack } => {
+                let (name, missing) = (names.barrier(barrier), names.amount(barrier, -slack));
+                let at = names.time(time);
+                write!(
+                    f,
+                    "the plant is not where the model led; as far off again, {name} would not be met at {at} s, by {missing}"
+                )
+            }
+            Failure::Missed { barrier } => {
+                write!(f, "{} came due while no plan was followed", names.barrier(barrier))
+            }
+            Failure::NoRest => f.write_str("the plant does not come to rest, or a set moves"),
+            Failure::Unsteady => f.write_str(
+                "the plant is so unstable on the way that a deviation too small to measure grows until the plan is lost; wider \
+                 bounds or a start farther from where they end would hold it",
+            ),
+            Failure::Apart { barriers, contained: true } => write!(
+                f,
+                "{}; and {} contains the start, so that it is to be kept from there on: did you mean `begin`?",
+                names.apart(barriers),
+                names.barrier(barriers[0])
+            ),
+            Failure::Apart { barriers, contained: false } => {
+                write!(f, "{}, and both are to be kept at the same time", names.apart(barriers))
+            }
+            Failure::Nothing => f.write_str("there is nothing from there that could be promised"),
+            Failure::TooLong => {
+                f.write_str("there are too many samples until the deadline, or too long a step")
+            }
+            Failure::Singular => f.write_str("the model is not finite, or no step resolves it"),
+        }
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.named(&Numbers).fmt(f)
+    }
+}
+
+impl core::error::Error for Failure {}
+
+#[cfg(test)]
+mod tests {
+    use alloc::string::ToString;
+
+    use super::*;
+
+    struct GoalAndRock;
+
+    impl Names for GoalAndRock {
+        fn barrier(&self, barrier: usize) -> String {
+            ["goal", "rock"][barrier].to_string()
+        }
+
+        fn amount(&self, _barrier: usize, value: f64) -> String {
+            format!("{value} m")
+        }
+    }
+
+    #[test]
+    fn words_name_barriers_by_number_or_by_name() {
+        let broken = Failure::Broken { barrier: 1, time: 2.5, slack: -0.25 };
+        assert_eq!(broken.to_string(), "barrier 1 is not met at 2.5 s, by 0.25");
+        assert_eq!(broken.named(&GoalAndRock).to_string(), "rock is not met at 2.5 s, by 0.25 m");
+        let apart = Failure::Apart { barriers: [0, 1], contained: false };
+        let wanted = "no state is in both goal and rock, and both are to be kept at the same time";
+        assert_eq!(apart.named(&GoalAndRock).to_string(), wanted);
+    }
 }

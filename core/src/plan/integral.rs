@@ -5,11 +5,11 @@ use crate::lie::{Ahead, COURSE, Course, CourseOver, Predict, RateOver};
 
 /// A state that is the integral of an input, and of which the plant is given the mean over each period, held.
 #[derive(Clone, Copy, Debug)]
-pub struct Integral {
+pub(crate) struct Integral {
     /// The number of the state.
-    pub state: usize,
+    pub(crate) state: usize,
     /// The number of the input that is its derivative.
-    pub input: usize,
+    pub(crate) input: usize,
 }
 
 /// A limit of a state as a barrier: h = `sign` (x − `limit`).

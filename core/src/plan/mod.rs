@@ -1,10 +1,10 @@
 //! Plans: a verified way to keep every promise, from a state on, within the bounds of the inputs.
 //!
 //! A *plan* is a list of held inputs and a law that holds the plant at rest after them. It is a *witness* of the promise:
-//! run ahead in the model, it meets every [`Requirement`] at all times. A filter that applies at every sample either an
+//! run ahead in the model, it meets every requirement at all times. A filter that applies at every sample either an
 //! input with a new witness behind it, or the next input of the witness it has, keeps every requirement for ever. The
 //! lemma and its proof are in `docs/theory.md#witness`. Where there is no rest, or a set moves, a plan may end at a
-//! [horizon](Planner::until): the requirements are kept until then.
+//! [horizon](crate::filter::Pace::horizon): the requirements are kept until then.
 //!
 //! | module | owns |
 //! |---|---|
@@ -13,6 +13,7 @@
 //! | `witness`, `failure` | a verified list of inputs; why there is none |
 //! | `check` | the exact check: a roll-out that meets every requirement, between its nodes too |
 //! | `course` | polynomials in time, and what they do not fall below |
+//! | `failure` | why there is no plan, in words |
 //! | `integral` | the mean of an integral over each period, and its limits |
 //! | `search` | reference trajectories by sequential convex programming |
 //! | `planner` | which trials are made, in which order, and what is kept between samples |
@@ -30,11 +31,10 @@ mod search;
 mod witness;
 
 pub(crate) use check::ON_TIME;
-pub use failure::Failure;
-pub use integral::Integral;
-pub(crate) use integral::Limit;
+pub use failure::{Failure, Names};
+pub(crate) use integral::{Integral, Limit};
 pub(crate) use model::slopes;
-pub use planner::{Planner, Sought};
+pub(crate) use planner::{Planner, Sought};
 pub use witness::{Tightest, Witness};
 
 use alloc::boxed::Box;
@@ -46,24 +46,24 @@ use law::{Brake, Reference};
 
 /// What a plan has to keep: h(t, x(t)) ≥ `margin` for `from` ≤ t < `until`.
 #[derive(Clone, Copy)]
-pub struct Requirement<'a> {
+pub(crate) struct Requirement<'a> {
     /// The number of its barrier, to name it by.
-    pub barrier: usize,
+    pub(crate) barrier: usize,
     /// Whether it is one of the limits of an integral, which come after the barriers and may be reached.
-    pub is_limit: bool,
+    pub(crate) is_limit: bool,
     /// The barrier along the plant, run ahead.
-    pub model: &'a dyn Predict,
+    pub(crate) model: &'a dyn Predict,
     /// First time in s.
-    pub from: f64,
+    pub(crate) from: f64,
     /// Last time in s; infinite for ever.
-    pub until: f64,
+    pub(crate) until: f64,
     /// Least value in the unit of h, ≥ 0; of a limit that is kept a part of its last digit below 0.
-    pub margin: f64,
+    pub(crate) margin: f64,
     /// From when in s it has to be there: what begins at the edge has some time to leave it.
-    pub firm: f64,
+    pub(crate) firm: f64,
     /// Least value that a new plan keeps, in the unit of h, ≥ 0: what is more than the margin is a reserve for a plant that is
     /// not quite the model. The rest of a plan may use it up.
-    pub reserve: f64,
+    pub(crate) reserve: f64,
 }
 
 /// A law that may keep what is asked for, such as a controller of one's own: it writes the input at a time in s and a state.

@@ -15,7 +15,7 @@ use crate::lie::Predict;
 use crate::qp::Bounds;
 use crate::{MAX_INPUTS, elementary};
 
-pub use renewal::Sought;
+pub(crate) use renewal::Sought;
 
 /// Grids: the part of the time until each deadline after which its set is already asked for in the search, and the number of
 /// holds until the last deadline and after it. First for a plant that stops soon, then for one that does not, then for
@@ -128,7 +128,7 @@ impl Ending<'_> {
 
 /// The plant, its bounds and the requirements at a sample, from which plans are made.
 #[derive(Clone, Copy)]
-pub struct Planner<'a> {
+pub(crate) struct Planner<'a> {
     plant: &'a dyn Predict,
     dims: [usize; 2],
     bounds: &'a Bounds,
@@ -156,7 +156,7 @@ pub struct Planner<'a> {
 impl<'a> Planner<'a> {
     /// A planner for `plant`, which has as many states and inputs as `dims` says, and whose inputs are within `bounds` and
     /// held for `period` s; `size` > 0 is the size of an input that has no bounds, in its unit.
-    pub fn new(
+    pub(crate) fn new(
         plant: &'a dyn Predict,
         dims: [usize; 2],
         bounds: &'a Bounds,
@@ -185,52 +185,52 @@ impl<'a> Planner<'a> {
 
     /// The same planner at a sample that did not come as those before did, or is held for another time.
     #[must_use]
-    pub fn irregular(self, irregular: bool) -> Self {
+    pub(crate) fn irregular(self, irregular: bool) -> Self {
         Self { regular: !irregular, ..self }
     }
 
     /// The same planner between samples: a walk behind another input is given up where it takes many more pieces than the plan at
     /// hand, and a search goes on at the next sample after so many quadratic programs.
     #[must_use]
-    pub fn hurried(self, programs: u32) -> Self {
+    pub(crate) fn hurried(self, programs: u32) -> Self {
         Self { hurried: true, programs, ..self }
     }
 
     /// The same planner where samples are usually `usual` s apart: a plan that is made where they follow sooner has holds of
     /// about that, so that its cost does not grow with their number.
     #[must_use]
-    pub fn usually(self, usual: f64) -> Self {
+    pub(crate) fn usually(self, usual: f64) -> Self {
         Self { usual, ..self }
     }
 
     /// The same planner for a plant that is given the mean of an integral over each period.
     #[must_use]
-    pub fn integrated(self, integral: Integral) -> Self {
+    pub(crate) fn integrated(self, integral: Integral) -> Self {
         Self { integral: Some(integral), ..self }
     }
 
     /// The same planner with these policies to begin a search with.
     #[must_use]
-    pub fn led(self, policies: &'a [Policy]) -> Self {
+    pub(crate) fn led(self, policies: &'a [Policy]) -> Self {
         Self { policies, ..self }
     }
 
     /// The same planner, whose plans need not end at rest where they reach so many seconds, finite, > 0, past the last
     /// deadline and the sample.
     #[must_use]
-    pub fn until(self, horizon: Option<f64>) -> Self {
+    pub(crate) fn until(self, horizon: Option<f64>) -> Self {
         Self { horizon, ..self }
     }
 
     /// The same planner for plans that reach no less far than `before`, with which a search begins.
     #[must_use]
-    pub fn beyond(self, before: &'a Witness) -> Self {
+    pub(crate) fn beyond(self, before: &'a Witness) -> Self {
         Self { before: Some(before), ..self }
     }
 
     /// The same planner for deadlines that are `factor` times as long as those of `plan`, with which alone a search begins.
     #[must_use]
-    pub fn beside(self, plan: &'a Plan, factor: f64) -> Self {
+    pub(crate) fn beside(self, plan: &'a Plan, factor: f64) -> Self {
         Self { beside: Some((plan, factor)), ..self }
     }
 
@@ -254,7 +254,7 @@ impl<'a> Planner<'a> {
     /// # Errors
     ///
     /// What the nearest trial fails at.
-    pub fn search(&self, t: f64, x: &[f64]) -> Result<Plan, Failure> {
+    pub(crate) fn search(&self, t: f64, x: &[f64]) -> Result<Plan, Failure> {
         let paced = Self { period: self.pace(), ..*self };
         let to = |horizon| paced.search_to(horizon, t, x);
         match (self.horizon, self.before.map(|before| before.until.is_finite())) {
@@ -532,7 +532,7 @@ impl<'a> Planner<'a> {
     }
 
     /// Whether `plan`, found from `x` at `t` for other requirements, keeps these as strictly as a new one has to.
-    pub fn keeps(&self, plan: &Plan, t: f64, x: &[f64]) -> bool {
+    pub(crate) fn keeps(&self, plan: &Plan, t: f64, x: &[f64]) -> bool {
         self.walk(plan, 1.0, Grid { period: self.period, even: true }, (t, x), None, true).is_ok()
     }
 
@@ -542,7 +542,7 @@ impl<'a> Planner<'a> {
     /// # Errors
     ///
     /// What the first of these fails at.
-    pub fn behind(&self, plan: &Plan, t: f64, x: &[f64], u: &[f64]) -> Result<Witness, Failure> {
+    pub(crate) fn behind(&self, plan: &Plan, t: f64, x: &[f64], u: &[f64]) -> Result<Witness, Failure> {
         self.on_a_grid(|grid| {
             let at = t + self.period;
             let has_reference =
@@ -573,7 +573,7 @@ impl<'a> Planner<'a> {
     /// # Errors
     ///
     /// What it fails at.
-    pub fn tail(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<Witness, Failure> {
+    pub(crate) fn tail(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<Witness, Failure> {
         let nu = self.dims[1];
         // As many of its holds as `held`, then the law behind it.
         let replay = |grid: Grid, held: usize, follows: bool| {
@@ -621,14 +621,14 @@ impl<'a> Planner<'a> {
     /// # Errors
     ///
     /// What it fails at.
-    pub fn holds(&self, t: f64, x: &[f64], u: &[f64]) -> Result<(), Failure> {
+    pub(crate) fn holds(&self, t: f64, x: &[f64], u: &[f64]) -> Result<(), Failure> {
         let grid = Grid { period: self.period, even: true };
         let mut walk = Walk::new(self.model(self.pace()), self.requirements, 1.0, grid, (t, x))?;
         walk.hold_until(u, t + self.period)
     }
 
     /// Runs the plant on from `x` until the next sample, under `u`, to round-off.
-    pub fn run(&self, x: &mut [f64], u: &[f64]) {
+    pub(crate) fn run(&self, x: &mut [f64], u: &[f64]) {
         let grid = Grid { period: self.period, even: true };
         if let Ok(mut walk) = Walk::new(self.model(self.pace()), &[], 0.0, grid, (0.0, x)) {
             walk.run(x, u, self.period);
@@ -640,7 +640,7 @@ impl<'a> Planner<'a> {
     /// # Errors
     ///
     /// What it fails at.
-    pub fn nearly(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<[f64; MAX_INPUTS], Failure> {
+    pub(crate) fn nearly(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<[f64; MAX_INPUTS], Failure> {
         let grid = Grid { period: self.period, even: true };
         let follow = |follows| self.walk(plan, NEARLY, grid, (t, x), None, follows);
         let near = follow(true).or_else(|failure| follow(false).map_err(|_| failure))?;

@@ -2,24 +2,25 @@
 
 #![allow(dead_code, reason = "each test binary uses its part")]
 
+use std::array::from_fn;
+
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{BarrierSettings, Filter};
-use punctual_core::nalgebra::{SMatrix, SVector, vector};
+use punctual_core::plants::PointMass;
 use punctual_core::scalar::Scalar;
-use punctual_reference::plants::PointMass;
 
 /// A chain of `N` integrators, u in the last.
 #[derive(Clone, Copy)]
 pub(crate) struct Integrator<const N: usize>;
 
 impl<const N: usize> ControlAffine<N, 1> for Integrator<N> {
-    fn drift<S: Scalar>(&self, x: &SVector<S, N>) -> SVector<S, N> {
-        SVector::from_fn(|i, _| if i + 1 < N { x[i + 1] } else { S::zero() })
+    fn drift<S: Scalar>(&self, x: &[S; N]) -> [S; N] {
+        from_fn(|i| if i + 1 < N { x[i + 1] } else { S::zero() })
     }
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, N>) -> SMatrix<S, N, 1> {
-        SMatrix::from_fn(|i, _| if i + 1 == N { S::one() } else { S::zero() })
+    fn input_map<S: Scalar>(&self, _x: &[S; N]) -> [[S; 1]; N] {
+        from_fn(|i| from_fn(|_| if i + 1 == N { S::one() } else { S::zero() }))
     }
 }
 
@@ -27,7 +28,7 @@ impl<const N: usize> ControlAffine<N, 1> for Integrator<N> {
 pub(crate) struct NonNegative;
 
 impl<const NX: usize> Barrier<NX> for NonNegative {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, NX>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; NX]) -> S {
         x[0]
     }
 }
@@ -60,11 +61,11 @@ pub(crate) fn goal(settings: BarrierSettings) -> Filter {
 }
 
 /// Damping of the point mass: u_ref = −(v_x, v_y).
-pub(crate) fn damping(_t: f64, x: &SVector<f64, 4>) -> SVector<f64, 2> {
-    vector![-x[2], -x[3]]
+pub(crate) fn damping(_t: f64, x: &[f64; 4]) -> [f64; 2] {
+    [-x[2], -x[3]]
 }
 
 /// Damping of the unicycle and the bicycle: u_ref = (−v, 0).
-pub(crate) fn speed_damping(_t: f64, x: &SVector<f64, 4>) -> SVector<f64, 2> {
-    vector![-x[3], 0.0]
+pub(crate) fn speed_damping(_t: f64, x: &[f64; 4]) -> [f64; 2] {
+    [-x[3], 0.0]
 }

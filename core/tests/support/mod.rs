@@ -6,14 +6,13 @@ use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::lie::{self, DerivativeSource, Derivatives, Directional, Predict, PredictDirectional};
-use punctual_core::nalgebra::{SMatrix, SVector};
+use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 use punctual_core::scalar::Scalar;
-use punctual_reference::plants::{Bicycle, PointMass, Unicycle};
 
 /// A matrix of zeros with `value` in the last row: one input, in the last equation.
-fn last_equation<S: Scalar, const NX: usize>(value: S) -> SMatrix<S, NX, 1> {
-    let mut g = SMatrix::zeros();
-    g[(NX - 1, 0)] = value;
+fn last_equation<S: Scalar, const NX: usize>(value: S) -> [[S; 1]; NX] {
+    let mut g = [[S::zero()]; NX];
+    g[NX - 1][0] = value;
     g
 }
 
@@ -22,10 +21,10 @@ fn last_equation<S: Scalar, const NX: usize>(value: S) -> SMatrix<S, NX, 1> {
 pub(crate) struct Cart;
 
 impl ControlAffine<2, 1> for Cart {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-        SVector::from([x[1], -x[1].squared() / 8.0 - x[0].powi(3)])
+    fn drift<S: Scalar>(&self, x: &[S; 2]) -> [S; 2] {
+        [x[1], -x[1].squared() / 8.0 - x[0].powi(3)]
     }
-    fn input_map<S: Scalar>(&self, x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
+    fn input_map<S: Scalar>(&self, x: &[S; 2]) -> [[S; 1]; 2] {
         last_equation((-x[0] / 4.0).exp())
     }
 }
@@ -34,7 +33,7 @@ impl ControlAffine<2, 1> for Cart {
 pub(crate) struct Powers;
 
 impl Barrier<2> for Powers {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 2>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; 2]) -> S {
         (x[0].squared() + 1.0).powf(-1.75) - x[0].powi(5) / 16.0 + (x[0] + 3.0).powi(-3)
     }
 }
@@ -44,15 +43,15 @@ impl Barrier<2> for Powers {
 pub(crate) struct Chain4;
 
 impl ControlAffine<4, 1> for Chain4 {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
-        SVector::from([
+    fn drift<S: Scalar>(&self, x: &[S; 4]) -> [S; 4] {
+        [
             x[1].sin(),
             x[2] / (x[0].squared() + 1.0),
             (-x[0]).exp() + x[3],
             (x[0].sin() + 2.0).sqrt() * (x[1].squared() + 1.5).powf(0.625),
-        ])
+        ]
     }
-    fn input_map<S: Scalar>(&self, x: &SVector<S, 4>) -> SMatrix<S, 4, 1> {
+    fn input_map<S: Scalar>(&self, x: &[S; 4]) -> [[S; 1]; 4] {
         last_equation(x[0].cos() + 2.0)
     }
 }
@@ -61,7 +60,7 @@ impl ControlAffine<4, 1> for Chain4 {
 pub(crate) struct Logarithmic;
 
 impl Barrier<4> for Logarithmic {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 4>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; 4]) -> S {
         (x[0] + 2.0).ln() + x[0].atan() - (x[0] / 2.0).tan() / 2.0
     }
 }
@@ -71,19 +70,10 @@ impl Barrier<4> for Logarithmic {
 pub(crate) struct Chain8;
 
 impl ControlAffine<8, 1> for Chain8 {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 8>) -> SVector<S, 8> {
-        SVector::from([
-            x[1],
-            x[2],
-            x[3] + x[0].sin() / 2.0,
-            x[4],
-            x[5] - x[1] * x[2] / 4.0,
-            x[6],
-            x[7] + x[3].cos(),
-            -x[0],
-        ])
+    fn drift<S: Scalar>(&self, x: &[S; 8]) -> [S; 8] {
+        [x[1], x[2], x[3] + x[0].sin() / 2.0, x[4], x[5] - x[1] * x[2] / 4.0, x[6], x[7] + x[3].cos(), -x[0]]
     }
-    fn input_map<S: Scalar>(&self, x: &SVector<S, 8>) -> SMatrix<S, 8, 1> {
+    fn input_map<S: Scalar>(&self, x: &[S; 8]) -> [[S; 1]; 8] {
         last_equation(x[0].cos() + 2.0)
     }
 }
@@ -92,7 +82,7 @@ impl ControlAffine<8, 1> for Chain8 {
 pub(crate) struct Exponential;
 
 impl Barrier<8> for Exponential {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 8>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; 8]) -> S {
         (-x[0] / 2.0).exp() - 1.0
     }
 }
@@ -102,7 +92,7 @@ impl Barrier<8> for Exponential {
 pub(crate) struct MovingDisc;
 
 impl Barrier<4> for MovingDisc {
-    fn value<S: Scalar>(&self, t: S, x: &SVector<S, 4>) -> S {
+    fn value<S: Scalar>(&self, t: S, x: &[S; 4]) -> S {
         let dx = x[0] - 8.0 - (t / 2.0).sin() * 3.0;
         let dy = x[1] - t.squared() / 4.0 + 1.0;
         t.cos() / 4.0 + 2.0 - (dx.squared() + dy.squared() + 1.0).sqrt()
@@ -113,7 +103,7 @@ impl Barrier<4> for MovingDisc {
 pub(crate) struct SpeedLimit;
 
 impl Barrier<4> for SpeedLimit {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 4>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; 4]) -> S {
         -x[3].squared() / 4.0 + 30.0
     }
 }
@@ -122,7 +112,7 @@ impl Barrier<4> for SpeedLimit {
 pub(crate) struct SecondState;
 
 impl<const NX: usize> Barrier<NX> for SecondState {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, NX>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; NX]) -> S {
         -x[1] + 1.0
     }
 }
@@ -132,11 +122,11 @@ impl<const NX: usize> Barrier<NX> for SecondState {
 pub(crate) struct Uncoupled;
 
 impl ControlAffine<2, 1> for Uncoupled {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-        SVector::from([S::zero(), -x[1] + x[1].squared() / 2.0])
+    fn drift<S: Scalar>(&self, x: &[S; 2]) -> [S; 2] {
+        [S::zero(), -x[1] + x[1].squared() / 2.0]
     }
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 1> {
-        SMatrix::from([[S::one(), S::zero()]])
+    fn input_map<S: Scalar>(&self, _x: &[S; 2]) -> [[S; 1]; 2] {
+        [[S::one()], [S::zero()]]
     }
 }
 

@@ -5,7 +5,7 @@ use punctual_core::barrier::Barrier;
 use punctual_core::dynamics::{ControlAffine, WithPoint};
 use punctual_core::filter::FilterBuilder;
 use punctual_core::lie::{self, DerivativeSource, RelativeDegree};
-use punctual_reference::plants::{PointMass, Signal, Unicycle};
+use punctual_core::plants::{PointMass, Signal, Unicycle};
 
 use super::filter::UNBOUNDED;
 use super::{BarrierSection, ConfigurationError, FilterConfiguration, ModelName, PlantSection};

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use punctual_core::MAX_ROWS;
 use punctual_core::filter::{Begin, End, Filter, FilterBuilder, Sampling, Strictness};
 use punctual_core::lie::RelativeDegree;
-use punctual_core::plan::Failure;
+use punctual_core::plan::{Failure, Names};
 use serde::{Deserialize, Serialize};
 
 use super::adding::{Adding, Uneven, not_affine};
@@ -722,57 +722,10 @@ impl FilterConfiguration {
 
     /// What keeps a plan from being one, in words.
     pub fn failure(&self, failure: Failure) -> String {
-        match failure {
-            Failure::Broken { barrier, time, slack } => {
-                // After the barriers come the limits of the integrator; one of a state from elsewhere may have any number.
-                let (name, unit) = match (self.barrier.get(barrier), &self.integrator) {
-                    (Some(section), _) => (section.name.clone(), section.unit(&self.plant)),
-                    (None, Some(integrator)) => {
-                        let name = format!("the limit of {}", integrator.state);
-                        let state = self.plant.states().into_iter().find(|s| s.name == integrator.state);
-                        (name, state.map(|s| s.unit).unwrap_or_default())
-                    }
-                    (None, None) => ("a barrier".to_owned(), String::new()),
-                };
-                format!("{name} is not met at {} s, by {}", number(time), quantity(-slack, &unit))
-            }
-            Failure::Drift { barrier, time, slack } => {
-                let section = self.barrier.get(barrier);
-                let name = section.map_or("a barrier", |section| &section.name);
-                let unit = section.map(|section| section.unit(&self.plant)).unwrap_or_default();
-                format!(
-                    "the plant is not where the model led; as far off again, {name} would not be met at {time:.6} s, by {:.6} \
-                     {unit}",
-                    -slack
-                )
-            }
-            Failure::Missed { barrier } => {
-                let name = self.barrier.get(barrier).map_or("a barrier", |section| &section.name);
-                format!("{name} came due while no plan was followed")
-            }
-            Failure::NoRest if self.plan_horizon.is_none() => {
-                "the plant does not come to rest, or a set moves; with `plan_horizon` a plan may end before"
-                    .to_owned()
-            }
-            Failure::NoRest => "no plan reaches as far as plan_horizon".to_owned(),
-            Failure::Unsteady => "the plant is so unstable on the way that a deviation too small to measure grows until the plan \
-                                  is lost; wider bounds or a start farther from where they end would hold it"
-                .to_owned(),
-            Failure::Apart { barriers, contained } => {
-                let apart = self.apart_in_words(barriers).unwrap_or_default();
-                let name = self.barrier.get(barriers[0]).map_or("", |section| &section.name);
-                match contained {
-                    true => format!(
-                        "{apart}; and {name} contains the start, so that it is to be kept from there on: did you mean `begin`?"
-                    ),
-                    false => format!("{apart}, and both are to be kept at the same time"),
-                }
-            }
-            Failure::Nothing => "there is nothing from there that could be promised".to_owned(),
-            Failure::TooLong => {
-                "there are too many samples until the deadline, or too long a step".to_owned()
-            }
-            _ => "the model is not finite, or no step resolves it".to_owned(),
+        match (failure, self.plan_horizon) {
+            (Failure::NoRest, None) => format!("{failure}; with `plan_horizon` a plan may end before"),
+            (Failure::NoRest, Some(_)) => "no plan reaches as far as plan_horizon".to_owned(),
+            _ => failure.named(self).to_string(),
         }
     }
 
@@ -812,5 +765,36 @@ impl FilterConfiguration {
             (false, _) => End::Never,
         };
         Ok((begin, end))
+    }
+}
+
+/// Barriers by their names, and after them the limits of the integrator; one of a state from elsewhere may have any number.
+impl Names for FilterConfiguration {
+    fn barrier(&self, barrier: usize) -> String {
+        match (self.barrier.get(barrier), &self.integrator) {
+            (Some(section), _) => section.name.clone(),
+            (None, Some(integrator)) => format!("the limit of {}", integrator.state),
+            (None, None) => "a barrier".to_owned(),
+        }
+    }
+
+    fn amount(&self, barrier: usize, value: f64) -> String {
+        let unit = match (self.barrier.get(barrier), &self.integrator) {
+            (Some(section), _) => section.unit(&self.plant),
+            (None, Some(integrator)) => {
+                let state = self.plant.states().into_iter().find(|s| s.name == integrator.state);
+                state.map(|s| s.unit).unwrap_or_default()
+            }
+            (None, None) => String::new(),
+        };
+        quantity(value, &unit)
+    }
+
+    fn time(&self, time: f64) -> String {
+        number(time)
+    }
+
+    fn apart(&self, barriers: [usize; 2]) -> String {
+        self.apart_in_words(barriers).unwrap_or_default()
     }
 }

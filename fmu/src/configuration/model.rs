@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use punctual_core::dynamics::DynPlant;
+use punctual_core::plants::Signal;
 use punctual_core::scalar::Scalar;
 use punctual_models::{Functions, Model, Unit, unit_of};
-use punctual_reference::plants::Signal;
 use serde::{Deserialize, Serialize};
 
 use super::external::check_inputs as check_external_inputs;

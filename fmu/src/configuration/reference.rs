@@ -1,7 +1,7 @@
 //! The reference plants by name, with their constants.
 
 use punctual_core::dynamics::{DynPlant, Erased};
-use punctual_reference::plants::{
+use punctual_core::plants::{
     Bicycle, KinematicBicycle, PointMass, Signal, Signals, SmallSlipBicycle, SmallSlipBicycleWithRate,
     SteeredBicycle, Steering, Unicycle,
 };

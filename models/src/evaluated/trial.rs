@@ -1,6 +1,6 @@
 //! Trial of code at sample states, before anything depends on it.
 
-use punctual_core::lie;
+use punctual_core::internal::samples;
 
 use super::{Evaluated, Fault};
 use crate::Error;
@@ -28,7 +28,7 @@ type Outcome = Vec<[f64; 2]>;
 /// Something that the code must not do.
 pub(super) fn run(equations: &mut Evaluated, barriers: usize, ranges: &[[f64; 2]]) -> Result<(), Error> {
     let mut found: Vec<Found> = Vec::new();
-    for (k, (t, x)) in lie::samples(ranges).into_iter().enumerate() {
+    for (k, (t, x)) in samples(ranges).into_iter().enumerate() {
         // Components move forwards and backwards in turn, and no two of them by the same part.
         let part = |i: usize| if (i + k).is_multiple_of(2) { 1.0 } else { -0.7 + 0.01 * i as f64 };
         let v: Vec<f64> = x.iter().enumerate().map(|(i, x)| (1.0 + x.abs()) * part(i)).collect();

@@ -1,7 +1,7 @@
 //! What [`Gatekeeper`](super::Gatekeeper) and [`BackupBarrier`](super::BackupBarrier) fall back on: a controller, and the
 //! set in which it keeps.
 
-use nalgebra::SVector;
+use std::array::from_fn;
 
 use punctual_core::barrier::Barrier;
 use punctual_core::dynamics::{ControlAffine, rk4};
@@ -12,7 +12,7 @@ use punctual_core::scalar::Scalar;
 /// A feedback law.
 pub trait Law<const NX: usize, const NU: usize> {
     /// Its input at `x`, within the bounds of whoever uses it.
-    fn input<S: Scalar>(&self, x: &SVector<S, NX>) -> SVector<S, NU>;
+    fn input<S: Scalar>(&self, x: &[S; NX]) -> [S; NU];
 }
 
 /// Brakes: −gain · v on the first `M` inputs, together no longer than `limit`, and 0 on the others.
@@ -34,22 +34,22 @@ impl<const M: usize> Brake<M> {
     const SMALL: f64 = 1e-3;
 
     /// The path in m until rest, from above, with a derivative everywhere.
-    pub fn path<S: Scalar, const NX: usize>(&self, x: &SVector<S, NX>) -> S {
+    pub fn path<S: Scalar, const NX: usize>(&self, x: &[S; NX]) -> S {
         let square = self.square(x) + Self::SMALL * Self::SMALL;
         square.sqrt() / self.gain + square / (2.0 * self.limit)
     }
 
-    fn square<S: Scalar, const NX: usize>(&self, x: &SVector<S, NX>) -> S {
+    fn square<S: Scalar, const NX: usize>(&self, x: &[S; NX]) -> S {
         self.speeds.iter().fold(S::zero(), |sum, k| sum + x[*k].squared())
     }
 }
 
 impl<const M: usize, const NX: usize, const NU: usize> Law<NX, NU> for Brake<M> {
-    fn input<S: Scalar>(&self, x: &SVector<S, NX>) -> SVector<S, NU> {
+    fn input<S: Scalar>(&self, x: &[S; NX]) -> [S; NU] {
         let square = self.square(x);
         let is_short = square.value() * self.gain * self.gain <= self.limit * self.limit;
         let factor = if is_short { S::from(self.gain) } else { S::from(self.limit) / square.sqrt() };
-        SVector::from_fn(|i, _| self.speeds.get(i).map_or(S::zero(), |k| -x[*k] * factor))
+        from_fn(|i| self.speeds.get(i).map_or(S::zero(), |k| -x[*k] * factor))
     }
 }
 
@@ -64,7 +64,7 @@ pub struct Stoppable<B, const M: usize> {
 }
 
 impl<B: Barrier<NX>, const M: usize, const NX: usize> Barrier<NX> for Stoppable<B, M> {
-    fn value<S: Scalar>(&self, t: S, x: &SVector<S, NX>) -> S {
+    fn value<S: Scalar>(&self, t: S, x: &[S; NX]) -> S {
         self.set.value(t, x) - self.brake.path(x)
     }
 }
@@ -106,9 +106,9 @@ impl<P, L, B, C> Backup<P, L, B, C> {
     /// The state one period after `x` under the held input `u`.
     pub(super) fn moved<S: Scalar, const NX: usize, const NU: usize>(
         &self,
-        x: &SVector<S, NX>,
-        u: &SVector<S, NU>,
-    ) -> SVector<S, NX>
+        x: &[S; NX],
+        u: &[S; NU],
+    ) -> [S; NX]
     where
         P: ControlAffine<NX, NU>,
     {
@@ -116,13 +116,13 @@ impl<P, L, B, C> Backup<P, L, B, C> {
     }
 
     /// `u` within the bounds.
-    pub(super) fn bounded<const NU: usize>(&self, u: &SVector<f64, NU>) -> SVector<f64, NU> {
-        SVector::from_fn(|i, _| self.bounds.clamp(i, u[i]))
+    pub(super) fn bounded<const NU: usize>(&self, u: &[f64; NU]) -> [f64; NU] {
+        from_fn(|i| self.bounds.clamp(i, u[i]))
     }
 
     /// Whether the law leads from `x` at `t` into the terminal set within the horizon, and is safe at every sample on
     /// the way. From there on it is safe by the choice of that set.
-    pub fn saves<const NX: usize, const NU: usize>(&self, t: f64, x: &SVector<f64, NX>) -> bool
+    pub fn saves<const NX: usize, const NU: usize>(&self, t: f64, x: &[f64; NX]) -> bool
     where
         P: ControlAffine<NX, NU>,
         L: Law<NX, NU>,

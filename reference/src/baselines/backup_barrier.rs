@@ -1,6 +1,6 @@
 //! The backup control barrier function.
 
-use nalgebra::SVector;
+use std::array::from_fn;
 
 use punctual_core::barrier::Barrier;
 use punctual_core::dynamics::ControlAffine;
@@ -38,7 +38,7 @@ pub struct BackupBarrier<P, L, B, C> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BackedUp<const NU: usize> {
     /// The input: that of the quadratic program, or of the backup where its rows cannot be met.
-    pub input: SVector<f64, NU>,
+    pub input: [f64; NU],
     /// Whether the rows were met.
     pub met: bool,
     /// The least of h along the backup and of the terminal set at its end, in the unit of h: ≥ 0 in the set that is kept.
@@ -63,8 +63,8 @@ impl<P, L, B, C> BackupBarrier<P, L, B, C> {
     pub fn step<const NX: usize, const NU: usize>(
         &mut self,
         t: f64,
-        x: &SVector<f64, NX>,
-        u_ref: &SVector<f64, NU>,
+        x: &[f64; NX],
+        u_ref: &[f64; NU],
     ) -> BackedUp<NU>
     where
         P: ControlAffine<NX, NU>,
@@ -80,20 +80,16 @@ impl<P, L, B, C> BackupBarrier<P, L, B, C> {
             .map(|(value, slope)| Row { floor: -self.rate * value - slope, ..Row::ZERO })
             .collect();
         for j in 0..NU.min(MAX_INPUTS) {
-            let slopes = self.along(t, x, &map.column(j).into_owned());
+            let slopes = self.along(t, x, &map.map(|row| row[j]));
             for (row, (_, slope)) in rows.iter_mut().zip(slopes) {
                 row.normal[j] = slope;
             }
         }
         let least = along_drift.iter().map(|(value, _)| *value).fold(self.backup.safe.value(t, x), f64::min);
         let mut input = *u_ref;
-        let problem = Problem::new(
-            &rows,
-            &self.backup.bounds,
-            u_ref.as_slice(),
-            FilterBuilder::DEFAULT_CORRECTION_LIMIT,
-        );
-        let met = self.workspace.solve(&problem, input.as_mut_slice()).outcome == Outcome::Optimal;
+        let problem =
+            Problem::new(&rows, &self.backup.bounds, u_ref, FilterBuilder::DEFAULT_CORRECTION_LIMIT);
+        let met = self.workspace.solve(&problem, &mut input).outcome == Outcome::Optimal;
         if !met {
             input = self.backup.law.input(x);
         }
@@ -105,8 +101,8 @@ impl<P, L, B, C> BackupBarrier<P, L, B, C> {
     fn along<const NX: usize, const NU: usize>(
         &self,
         t: f64,
-        x: &SVector<f64, NX>,
-        direction: &SVector<f64, NX>,
+        x: &[f64; NX],
+        direction: &[f64; NX],
     ) -> Vec<(f64, f64)>
     where
         P: ControlAffine<NX, NU>,
@@ -114,7 +110,7 @@ impl<P, L, B, C> BackupBarrier<P, L, B, C> {
         B: Barrier<NX>,
         C: Barrier<NX>,
     {
-        let mut x = SVector::from_fn(|i, _| Tangent { value: x[i], directional: direction[i] });
+        let mut x = from_fn(|i| Tangent { value: x[i], directional: direction[i] });
         let mut found = Vec::with_capacity(self.backup.horizon + 1);
         let mut at = Tangent::from(t);
         for k in 1..=self.backup.horizon {
@@ -131,13 +127,12 @@ impl<P, L, B, C> BackupBarrier<P, L, B, C> {
 mod tests {
     use super::super::double_integrator::{LIMIT, PERIOD, WALL, backup, driven};
     use super::*;
-    use punctual_core::nalgebra::vector;
 
     #[test]
     fn stops_before_the_wall_that_it_is_pushed_into() {
         let mut filter = BackupBarrier::new(backup(), 2.0).expect("valid");
-        let way = driven(vector![0.0, 0.0], 900, |t, x| {
-            let step = filter.step(t, x, &vector![LIMIT]);
+        let way = driven([0.0, 0.0], 900, |t, x| {
+            let step = filter.step(t, x, &[LIMIT]);
             assert!(step.least > -1e-3 && step.input[0].abs() <= LIMIT, "{step:?} at {x:?}");
             step.input
         });
@@ -155,12 +150,12 @@ mod tests {
         let backup = backup();
         let (gain, n) = (backup.law.gain, backup.horizon as i32);
         let filter = BackupBarrier::new(backup, 2.0).expect("valid");
-        let x = vector![3.0, 0.05];
+        let x = [3.0, 0.05];
         let moved = |k: i32| {
             let left = (1.0 - gain * PERIOD).powi(k);
             (1.0 - gain * PERIOD / 2.0) * (1.0 - left) / gain
         };
-        let found = filter.along::<2, 1>(0.0, &x, &vector![0.0, 1.0]);
+        let found = filter.along::<2, 1>(0.0, &x, &[0.0, 1.0]);
         assert_eq!(found.len(), n as usize + 1);
         for k in 1..=n {
             let (h, slope) = found[k as usize - 1];

@@ -1,7 +1,5 @@
 //! A known case for the tests of what falls back on a brake: ẍ = u with |u| ≤ 2 m/s² before a wall.
 
-use nalgebra::{Matrix2x1, SVector, Vector2};
-
 use punctual_core::barrier::Barrier;
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::qp::Bounds;
@@ -20,12 +18,12 @@ pub(super) const PERIOD: f64 = 0.02;
 pub(super) struct Line;
 
 impl ControlAffine<2, 1> for Line {
-    fn drift<S: Scalar>(&self, x: &Vector2<S>) -> Vector2<S> {
-        Vector2::new(x[1], S::zero())
+    fn drift<S: Scalar>(&self, x: &[S; 2]) -> [S; 2] {
+        [x[1], S::zero()]
     }
 
-    fn input_map<S: Scalar>(&self, _x: &Vector2<S>) -> Matrix2x1<S> {
-        Matrix2x1::new(S::zero(), S::one())
+    fn input_map<S: Scalar>(&self, _x: &[S; 2]) -> [[S; 1]; 2] {
+        [[S::zero()], [S::one()]]
     }
 }
 
@@ -34,7 +32,7 @@ impl ControlAffine<2, 1> for Line {
 pub(super) struct Before;
 
 impl Barrier<2> for Before {
-    fn value<S: Scalar>(&self, _t: S, x: &Vector2<S>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; 2]) -> S {
         -x[0] + WALL
     }
 }
@@ -51,10 +49,10 @@ pub(super) fn backup() -> Backup<Line, Brake<1>, Before, Stoppable<Before, 1>> {
 
 /// `steps` states from `x` on with the inputs of `step`.
 pub(super) fn driven(
-    mut x: Vector2<f64>,
+    mut x: [f64; 2],
     steps: usize,
-    mut step: impl FnMut(f64, &Vector2<f64>) -> SVector<f64, 1>,
-) -> Vec<(Vector2<f64>, SVector<f64, 1>)> {
+    mut step: impl FnMut(f64, &[f64; 2]) -> [f64; 1],
+) -> Vec<([f64; 2], [f64; 1])> {
     (0..steps)
         .map(|k| {
             let (at, u) = (x, step(k as f64 * PERIOD, &x));

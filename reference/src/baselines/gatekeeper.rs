@@ -2,8 +2,6 @@
 
 use std::collections::VecDeque;
 
-use nalgebra::SVector;
-
 use punctual_core::barrier::Barrier;
 use punctual_core::dynamics::ControlAffine;
 
@@ -29,7 +27,7 @@ pub struct Gatekeeper<P, L, B, C, const NU: usize> {
     backup: Backup<P, L, B, C>,
     lead: usize,
     /// The nominal inputs that are left before the backup of what is committed; `None` before anything was.
-    committed: Option<VecDeque<SVector<f64, NU>>>,
+    committed: Option<VecDeque<[f64; NU]>>,
 }
 
 impl<P, L, B, C, const NU: usize> Gatekeeper<P, L, B, C, NU> {
@@ -43,9 +41,9 @@ impl<P, L, B, C, const NU: usize> Gatekeeper<P, L, B, C, NU> {
     pub fn step<const NX: usize>(
         &mut self,
         t: f64,
-        x: &SVector<f64, NX>,
-        nominal: impl Fn(f64, &SVector<f64, NX>) -> SVector<f64, NU>,
-    ) -> Option<SVector<f64, NU>>
+        x: &[f64; NX],
+        nominal: impl Fn(f64, &[f64; NX]) -> [f64; NU],
+    ) -> Option<[f64; NU]>
     where
         P: ControlAffine<NX, NU>,
         L: Law<NX, NU>,
@@ -80,13 +78,12 @@ impl<P, L, B, C, const NU: usize> Gatekeeper<P, L, B, C, NU> {
 mod tests {
     use super::super::double_integrator::{LIMIT, PERIOD, WALL, backup, driven};
     use super::*;
-    use punctual_core::nalgebra::vector;
 
     #[test]
     fn stops_before_the_wall_that_it_is_pushed_into() {
         let mut gatekeeper = Gatekeeper::new(backup(), 10);
-        let way = driven(vector![0.0, 0.0], 600, |t, x| {
-            gatekeeper.step(t, x, |_, _| vector![LIMIT]).expect("a backup from rest")
+        let way = driven([0.0, 0.0], 600, |t, x| {
+            gatekeeper.step(t, x, |_, _| [LIMIT]).expect("a backup from rest")
         });
         let last = way.last().expect("a way").0;
         assert!(way.iter().all(|(x, _)| x[0] <= WALL));
@@ -102,9 +99,8 @@ mod tests {
     #[test]
     fn leaves_alone_what_never_comes_near() {
         let mut gatekeeper = Gatekeeper::new(backup(), 10);
-        let way = driven(vector![0.0, 0.0], 300, |t, x| {
-            gatekeeper.step(t, x, |t, _| vector![0.3 * t.cos()]).expect("a backup")
-        });
+        let way =
+            driven([0.0, 0.0], 300, |t, x| gatekeeper.step(t, x, |t, _| [0.3 * t.cos()]).expect("a backup"));
         assert!(way.iter().enumerate().all(|(k, (_, u))| u[0] == 0.3 * (k as f64 * PERIOD).cos()));
     }
 
@@ -112,9 +108,9 @@ mod tests {
     fn refuses_a_start_that_cannot_stop() {
         // 8 m/s need 16 m, and there are 10.
         let mut gatekeeper = Gatekeeper::new(backup(), 10);
-        assert_eq!(gatekeeper.step(0.0, &vector![0.0, 8.0], |_, _| vector![0.0]), None);
+        assert_eq!(gatekeeper.step(0.0, &[0.0, 8.0], |_, _| [0.0]), None);
         // Once committed, the committed one goes on where the model is left.
-        assert!(gatekeeper.step(0.0, &vector![0.0, 1.0], |_, _| vector![0.0]).is_some());
-        assert!(gatekeeper.step(PERIOD, &vector![0.0, 8.0], |_, _| vector![0.0]).is_some());
+        assert!(gatekeeper.step(0.0, &[0.0, 1.0], |_, _| [0.0]).is_some());
+        assert!(gatekeeper.step(PERIOD, &[0.0, 8.0], |_, _| [0.0]).is_some());
     }
 }

@@ -4,13 +4,14 @@
 
 extern crate alloc;
 
+use core::array::from_fn;
+
 use alloc::boxed::Box;
 
 use punctual_core::Error;
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{BarrierSettings, Filter, Status};
-use punctual_core::nalgebra::{SMatrix, SVector};
 use punctual_core::scalar::Scalar;
 
 #[panic_handler]
@@ -22,12 +23,12 @@ fn panic(_: &core::panic::PanicInfo) -> ! {
 struct PointMass;
 
 impl ControlAffine<4, 2> for PointMass {
-    fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
-        SVector::from([x[2], x[3], S::zero(), S::zero()])
+    fn drift<S: Scalar>(&self, x: &[S; 4]) -> [S; 4] {
+        [x[2], x[3], S::zero(), S::zero()]
     }
 
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 4>) -> SMatrix<S, 4, 2> {
-        SMatrix::from_fn(|i, j| if i == j + 2 { S::one() } else { S::zero() })
+    fn input_map<S: Scalar>(&self, _x: &[S; 4]) -> [[S; 2]; 4] {
+        from_fn(|i| from_fn(|j| if i == j + 2 { S::one() } else { S::zero() }))
     }
 }
 

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use punctual_core::filter::{Driver, Standing};
-use punctual_reference::plants::Unicycle;
+use punctual_core::plants::Unicycle;
 
 use super::cases;
 use crate::judge::case::{Case, Numbers, Reference, Set};

@@ -2,10 +2,9 @@
 
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{Driver, Status};
-use punctual_core::nalgebra::SVector;
 use punctual_core::plan::Failure;
+use punctual_core::plants::Unicycle;
 use punctual_reference::nominal::Heading;
-use punctual_reference::plants::Unicycle;
 
 use super::cases;
 use crate::judge::on_every_core;
@@ -43,7 +42,7 @@ where
 {
     let mut filter = filter(plant, bounds).with_plans(STEP).expect("a filter that can be assured");
     let heading = Heading { speed_limit: 6.0, ..Heading::towards(GOAL.0) };
-    let mut x = SVector::from(start);
+    let mut x = start;
     let mut run = Run {
         start,
         steps: 0,
@@ -58,13 +57,10 @@ where
     for k in 0..(1.5 * DEADLINE / STEP).round() as usize {
         let t = k as f64 * STEP;
         let waypoint = heading.around([x[0], x[1]], &OBSTACLES, 1.0);
-        let u_ref = nominal(waypoint, &x.into());
-        let mut u = SVector::<f64, 2>::zeros();
-        let assurance = filter
-            .step(t, x.as_slice(), &u_ref, u.as_mut_slice())
-            .expect("right dimensions")
-            .assurance
-            .expect("plans");
+        let u_ref = nominal(waypoint, &x);
+        let mut u = [0.0; 2];
+        let assurance =
+            filter.step(t, &x, &u_ref, &mut u).expect("right dimensions").assurance.expect("plans");
         if k == 0 && !assurance.is_assured() {
             return Run { refused: assurance.failure, ..run };
         }

@@ -16,7 +16,7 @@ use clarabel::solver::{
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Sampling};
 use punctual_core::plan::Failure;
-use punctual_reference::plants::PointMass;
+use punctual_core::plants::PointMass;
 
 use super::cases;
 use crate::judge::case::Numbers;

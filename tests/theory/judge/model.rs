@@ -4,10 +4,9 @@ use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, Outside, QuadraticDisc};
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::lie::{self, DerivativeSource};
-use punctual_core::nalgebra::SVector;
+use punctual_core::plants::{Bicycle, KinematicBicycle, PointMass, SmallSlipBicycle, Unicycle};
 use punctual_core::scalar::Scalar;
 use punctual_models::Model;
-use punctual_reference::plants::{Bicycle, KinematicBicycle, PointMass, SmallSlipBicycle, Unicycle};
 
 use crate::chains::Chain;
 
@@ -223,7 +222,7 @@ struct Line {
 }
 
 impl<const N: usize> Barrier<N> for Line {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, N>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; N]) -> S {
         (x[0] - self.at) * self.sign
     }
 }
@@ -250,7 +249,7 @@ struct Angle {
 }
 
 impl Barrier<5> for Angle {
-    fn value<S: Scalar>(&self, _t: S, x: &SVector<S, 5>) -> S {
+    fn value<S: Scalar>(&self, _t: S, x: &[S; 5]) -> S {
         x[4] * -self.sign + self.limit
     }
 }

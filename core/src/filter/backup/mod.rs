@@ -146,7 +146,7 @@ impl Filter {
     ///
     /// ```
     /// # use punctual_core::{barriers::DistanceDisc, filter::*};
-    /// # use punctual_reference::plants::Unicycle;
+    /// # use punctual_core::plants::Unicycle;
     /// let goal = DistanceDisc::new([20.0, 10.0], 2.0, 1.0)?;
     /// let mut filter = Filter::builder(4, 2)
     ///     .barrier("goal", Unicycle, goal, BarrierSettings::within(8.0))?

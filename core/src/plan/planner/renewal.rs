@@ -28,7 +28,7 @@ type Law<'a> = &'a dyn Fn(f64, &[f64], &mut [f64]);
 /// A search for a plan behind an input that is spread over samples: which guess it is at, and how far that has come.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Sought {
+pub(crate) struct Sought {
     /// The number of the guess, and of the quadratic programs for which it was followed.
     guess: u32,
     followed: u32,
@@ -75,7 +75,7 @@ impl Planner<'_> {
     /// # Errors
     ///
     /// What it fails at.
-    pub fn moved(&self, plan: &Plan, t: f64, x: &[f64], u: &[f64]) -> Result<Plan, Failure> {
+    pub(crate) fn moved(&self, plan: &Plan, t: f64, x: &[f64], u: &[f64]) -> Result<Plan, Failure> {
         let moved = self.led_by(plan, t, x, u)?.0.ok_or(Failure::Nothing)?;
         let witness = self.behind(&moved, t, x, u)?;
         Ok(Plan { witness, ..moved })
@@ -99,7 +99,7 @@ impl Planner<'_> {
     /// # Errors
     ///
     /// Whether the search goes on, where these steps lead to no plan.
-    pub fn renewed(
+    pub(crate) fn renewed(
         &self,
         plan: &Plan,
         t: f64,
@@ -127,7 +127,7 @@ impl Planner<'_> {
     /// # Errors
     ///
     /// Whether the search goes on, where these steps lead to no plan.
-    pub fn regained(&self, plan: &Plan, t: f64, x: &[f64], sought: &mut Sought) -> Result<Plan, bool> {
+    pub(crate) fn regained(&self, plan: &Plan, t: f64, x: &[f64], sought: &mut Sought) -> Result<Plan, bool> {
         let rest = plan.brake.as_ref().map(|brake| brake.input.clone()).unwrap_or_default();
         match self.step_on(plan, (t, x), &rest, sought) {
             Some(Ok(plan)) => Ok(plan),

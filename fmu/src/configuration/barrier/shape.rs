@@ -5,7 +5,7 @@ use punctual_core::barriers::{
     DistanceDisc, Ellipse, HalfPlane, NormBound, Outside, QuadraticDisc, Rectangle, StateBound,
 };
 use punctual_core::filter::FilterBuilder;
-use punctual_reference::plants::Signal;
+use punctual_core::plants::Signal;
 use serde::Serialize;
 
 use super::super::adding::Adding;

@@ -1,11 +1,9 @@
 //! Reference plants, with the state and input order of the paper, section IV.
 
-use nalgebra::{SMatrix, SVector};
-use punctual_core::elementary;
-
-use punctual_core::dynamics::{ControlAffine, DynPlant, IntegratedInput, Region, chain, check_lengths, rk4};
-use punctual_core::error::{Error, positive};
-use punctual_core::scalar::Scalar;
+use crate::dynamics::{ControlAffine, DynPlant, IntegratedInput, Region, chain, check_lengths, first, rk4};
+use crate::elementary;
+use crate::error::{Error, positive};
+use crate::scalar::Scalar;
 
 /// One component of a state or input: its name, unit and meaning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,19 +59,19 @@ impl ControlAffine<4, 2> for PointMass {
     const BENDS_SLOWLY: bool = true;
 
     #[inline]
-    fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
-        SVector::from([x[2], x[3], S::zero(), S::zero()])
+    fn drift<S: Scalar>(&self, x: &[S; 4]) -> [S; 4] {
+        [x[2], x[3], S::zero(), S::zero()]
     }
 
     #[inline]
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 4>) -> SMatrix<S, 4, 2> {
-        let mut g = SMatrix::zeros();
-        g[(2, 0)] = S::one();
-        g[(3, 1)] = S::one();
+    fn input_map<S: Scalar>(&self, _x: &[S; 4]) -> [[S; 2]; 4] {
+        let mut g = [[S::zero(); 2]; 4];
+        g[2][0] = S::one();
+        g[3][1] = S::one();
         g
     }
 
-    fn region(&self, x: &SVector<f64, 4>, bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
+    fn region(&self, x: &[f64; 4], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
         bounded_box([&[x[0], x[2]], &[x[1], x[3]]], bounds, time)
     }
 }
@@ -94,16 +92,16 @@ impl ControlAffine<2, 2> for MovedPoint {
     const BENDS_SLOWLY: bool = true;
 
     #[inline]
-    fn drift<S: Scalar>(&self, _x: &SVector<S, 2>) -> SVector<S, 2> {
-        SVector::zeros()
+    fn drift<S: Scalar>(&self, _x: &[S; 2]) -> [S; 2] {
+        [S::zero(); 2]
     }
 
     #[inline]
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 2>) -> SMatrix<S, 2, 2> {
-        SMatrix::identity()
+    fn input_map<S: Scalar>(&self, _x: &[S; 2]) -> [[S; 2]; 2] {
+        [[S::one(), S::zero()], [S::zero(), S::one()]]
     }
 
-    fn region(&self, x: &SVector<f64, 2>, bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
+    fn region(&self, x: &[f64; 2], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
         bounded_box([&[x[0]], &[x[1]]], bounds, time)
     }
 }
@@ -124,20 +122,20 @@ impl ControlAffine<4, 2> for Unicycle {
     const BENDS_SLOWLY: bool = true;
 
     #[inline]
-    fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
+    fn drift<S: Scalar>(&self, x: &[S; 4]) -> [S; 4] {
         let (sin, cos) = x[2].sin_cos();
-        SVector::from([x[3] * cos, x[3] * sin, S::zero(), S::zero()])
+        [x[3] * cos, x[3] * sin, S::zero(), S::zero()]
     }
 
     #[inline]
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 4>) -> SMatrix<S, 4, 2> {
-        let mut g = SMatrix::zeros();
-        g[(3, 0)] = S::one();
-        g[(2, 1)] = S::one();
+    fn input_map<S: Scalar>(&self, _x: &[S; 4]) -> [[S; 2]; 4] {
+        let mut g = [[S::zero(); 2]; 4];
+        g[3][0] = S::one();
+        g[2][1] = S::one();
         g
     }
 
-    fn region(&self, x: &SVector<f64, 4>, bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
+    fn region(&self, x: &[f64; 4], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
         driven([x[0], x[1]], x[3], bounds, time[1], 1.0)
     }
 }
@@ -175,19 +173,19 @@ impl ControlAffine<4, 2> for Bicycle {
     }
 
     #[inline]
-    fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
+    fn drift<S: Scalar>(&self, x: &[S; 4]) -> [S; 4] {
         Unicycle.drift(x)
     }
 
     #[inline]
-    fn input_map<S: Scalar>(&self, x: &SVector<S, 4>) -> SMatrix<S, 4, 2> {
-        let mut g = SMatrix::zeros();
-        g[(3, 0)] = S::one();
-        g[(2, 1)] = x[3] / self.l_r;
+    fn input_map<S: Scalar>(&self, x: &[S; 4]) -> [[S; 2]; 4] {
+        let mut g = [[S::zero(); 2]; 4];
+        g[3][0] = S::one();
+        g[2][1] = x[3] / self.l_r;
         g
     }
 
-    fn region(&self, x: &SVector<f64, 4>, bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
+    fn region(&self, x: &[f64; 4], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
         driven([x[0], x[1]], x[3], bounds, time[1], 1.0)
     }
 }
@@ -231,22 +229,22 @@ impl ControlAffine<4, 2> for SmallSlipBicycle {
     }
 
     #[inline]
-    fn drift<S: Scalar>(&self, x: &SVector<S, 4>) -> SVector<S, 4> {
+    fn drift<S: Scalar>(&self, x: &[S; 4]) -> [S; 4] {
         Unicycle.drift(x)
     }
 
     #[inline]
-    fn input_map<S: Scalar>(&self, x: &SVector<S, 4>) -> SMatrix<S, 4, 2> {
+    fn input_map<S: Scalar>(&self, x: &[S; 4]) -> [[S; 2]; 4] {
         let (sin, cos) = x[2].sin_cos();
-        let mut g = SMatrix::zeros();
-        g[(3, 0)] = S::one();
-        g[(0, 1)] = -x[3] * sin;
-        g[(1, 1)] = x[3] * cos;
-        g[(2, 1)] = x[3] / self.l_r;
+        let mut g = [[S::zero(); 2]; 4];
+        g[3][0] = S::one();
+        g[0][1] = -x[3] * sin;
+        g[1][1] = x[3] * cos;
+        g[2][1] = x[3] / self.l_r;
         g
     }
 
-    fn region(&self, x: &SVector<f64, 4>, bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
+    fn region(&self, x: &[f64; 4], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
         let slip = bounds[0][1].abs().max(bounds[1][1].abs());
         driven([x[0], x[1]], x[3], bounds, time[1], elementary::hypot(slip, 1.0))
     }
@@ -272,16 +270,16 @@ impl ControlAffine<5, 2> for SmallSlipBicycleWithRate {
     }
 
     #[inline]
-    fn drift<S: Scalar>(&self, x: &SVector<S, 5>) -> SVector<S, 5> {
+    fn drift<S: Scalar>(&self, x: &[S; 5]) -> [S; 5] {
         self.0.drift(x)
     }
 
     #[inline]
-    fn input_map<S: Scalar>(&self, x: &SVector<S, 5>) -> SMatrix<S, 5, 2> {
+    fn input_map<S: Scalar>(&self, x: &[S; 5]) -> [[S; 2]; 5] {
         self.0.input_map(x)
     }
 
-    fn region(&self, x: &SVector<f64, 5>, bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
+    fn region(&self, x: &[f64; 5], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
         self.0.region(x, bounds, time)
     }
 }
@@ -346,20 +344,20 @@ impl ControlAffine<5, 2> for KinematicBicycle {
     }
 
     #[inline]
-    fn drift<S: Scalar>(&self, x: &SVector<S, 5>) -> SVector<S, 5> {
+    fn drift<S: Scalar>(&self, x: &[S; 5]) -> [S; 5] {
         let [x_p, y_p, theta] = self.rates(x[2], x[3], self.slip_angle(x[4]));
-        SVector::from([x_p, y_p, theta, S::zero(), S::zero()])
+        [x_p, y_p, theta, S::zero(), S::zero()]
     }
 
     #[inline]
-    fn input_map<S: Scalar>(&self, _x: &SVector<S, 5>) -> SMatrix<S, 5, 2> {
-        let mut g = SMatrix::zeros();
-        g[(3, 0)] = S::one();
-        g[(4, 1)] = S::one();
+    fn input_map<S: Scalar>(&self, _x: &[S; 5]) -> [[S; 2]; 5] {
+        let mut g = [[S::zero(); 2]; 5];
+        g[3][0] = S::one();
+        g[4][1] = S::one();
         g
     }
 
-    fn region(&self, x: &SVector<f64, 5>, bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
+    fn region(&self, x: &[f64; 5], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
         driven([x[0], x[1]], x[3], bounds, time[1], 1.0)
     }
 }
@@ -411,11 +409,11 @@ impl DynPlant for SteeredBicycle {
             Steering::Angle => self.bicycle.slip_angle(u[1]),
             Steering::SlipAngle => u[1],
         };
-        let derivative = |x: &SVector<f64, 4>| {
+        let derivative = |x: &[f64; 4]| {
             let [x_p, y_p, theta] = self.bicycle.rates(x[2], x[3], beta);
-            SVector::from([x_p, y_p, theta, u[0]])
+            [x_p, y_p, theta, u[0]]
         };
-        x.copy_from_slice(rk4(derivative, &SVector::from_column_slice(x), dt).as_slice());
+        x.copy_from_slice(&rk4(derivative, &first(x), dt));
         Ok(())
     }
 }
