@@ -39,6 +39,6 @@ pub mod stay;
 
 pub use fixed_time::{DerivativeBound, FixedTime, Refusal};
 pub use phase::Phase;
-pub(crate) use sensitivity::BoundDerivative;
+pub use sensitivity::BoundDerivative;
 pub use settings::{FixedTimeSettings, Infeasible, Method, ProfileKind};
 pub use state::{FixedTimeState, Unmet};

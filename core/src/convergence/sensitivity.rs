@@ -34,15 +34,15 @@ const DIFFERENCE: [f64; 2] = [1e-5, 1e-4];
 /// direction: each in the unit of its number, over that of the direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub(crate) struct BoundDerivative {
+pub struct BoundDerivative {
     /// Derivative of the floor under h⁽ⁿ⁾.
-    pub(crate) floor: f64,
+    pub floor: f64,
     /// Derivative of the lower bound on h.
-    pub(crate) profile: f64,
+    pub profile: f64,
     /// Derivative of μ.
-    pub(crate) margin: f64,
+    pub margin: f64,
     /// Derivative of the sampled form, where a period was given; else zero.
-    pub(crate) sampled: PeriodBound,
+    pub sampled: PeriodBound,
 }
 
 impl BoundDerivative {
