@@ -373,8 +373,10 @@ impl Filter {
         let integrated = self.integrator.as_ref().map_or(0.0, |own| own.limited(state.integrated));
         self.rows.state.integrated = integrated;
         #[cfg(feature = "plan")]
-        if let Some(backup) = &mut self.backup {
-            backup.restart(&self.rows.state.plan);
+        match &mut self.backup {
+            Some(backup) => backup.restart(&self.rows.state.plan),
+            // Rows alone follow none.
+            None => self.rows.state.plan = Commitment::default(),
         }
         Ok(())
     }

@@ -162,13 +162,16 @@ impl Filter {
     ///
     /// # Errors
     ///
-    /// A number of `plans` out of range. A filter that cannot be assured: a barrier without a model to run ahead, or with
+    /// A number of `plans` out of range; a filter that has plans. A filter that cannot be assured: a barrier without a model to run ahead, or with
     /// another plant than the first one; one with a deadline that begins later, one that begins on another's arrival, or
     /// without a horizon one that moves for ever; a bound on disturbance or measurement errors; a delay. [`Self::obstacles`] lists them
     /// all.
     pub fn with_plans(mut self, plans: impl Into<Plans>) -> Result<Self, Error> {
         let plans = plans.into();
         plans.check()?;
+        if self.backup.is_some() {
+            return Err(Error::new(ErrorKind::Unsupported, "plans", "are there already, must be given once"));
+        }
         if let Some(obstacle) = self.obstacles(&plans).into_iter().next() {
             return Err(obstacle);
         }
