@@ -12,8 +12,8 @@
 //! isolation            FMUs in a child process, which may crash
 //! recording            the rows of a run; CSV
 //! validate             the defects of an FMU: archive, schema, rules, symbols, a trial
-//! outlines             the edges of safe sets in a plane
 //! coupling             several FMUs: system file, order, fixed-step master
+//! outlines             the edges of safe sets in a plane
 //! plot                 pictures of series; knows no FMU
 //! page                 a page of HTML with charts
 //! pictures             from a system file's plots and a recording to pictures

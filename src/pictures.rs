@@ -23,14 +23,29 @@ const BULK: (f64, f64) = (1.0, 99.0);
 /// Names of two states that are the axes of a plane.
 const PLANES: [[&str; 2]; 4] = [["x_p", "y_p"], ["x", "y"], ["px", "py"], ["p_x", "p_y"]];
 
+/// A picture, and what is drawn beneath it that no file can give.
+#[derive(Clone, Debug)]
+pub struct Drawing {
+    /// The picture, as a system file has it.
+    pub picture: Picture,
+    /// Sets beneath the paths of a plane, besides its discs.
+    pub outlines: Vec<Outline>,
+}
+
+impl From<Picture> for Drawing {
+    fn from(picture: Picture) -> Self {
+        Self { picture, outlines: Vec::new() }
+    }
+}
+
 /// The pictures of a system that asks for none: the paths where there is a plane, h with its lower bound for every filter,
 /// every input with its limits. Of the signals recorded alone.
-pub fn usual(system: &System, models: &[Model], outcome: &Outcome) -> Vec<Picture> {
+pub fn usual(system: &System, models: &[Model], outcome: &Outcome) -> Vec<Drawing> {
     let recorded = outcome.recording.columns();
     let components = parts(system, models);
     let is_recorded = |signal: &String| recorded.iter().any(|column| column.name == *signal);
-    let mut pictures: Vec<Picture> =
-        plane(&components, &outcome.recording).into_iter().map(Picture::Path).collect();
+    let mut pictures: Vec<Drawing> = plane(&components, &outcome.recording).into_iter().collect();
+    let mut add = |picture: TimePicture| pictures.push(Picture::Time(picture).into());
     for part in &components {
         let all = |names: Vec<String>| Some(names).filter(|names| names.iter().all(is_recorded));
         for Group { name, unit, barriers } in part.barriers() {
@@ -41,7 +56,7 @@ pub fn usual(system: &System, models: &[Model], outcome: &Outcome) -> Vec<Pictur
             };
             let promise = |b: &String| outcome.promises.iter().find(|p| p.barrier == part.signal(b));
             let mut deadlines = barriers.iter().filter_map(|b| promise(b)?.deadline);
-            pictures.push(Picture::Time(TimePicture {
+            add(TimePicture {
                 name: Some(name),
                 title: None,
                 signals,
@@ -50,12 +65,12 @@ pub fn usual(system: &System, models: &[Model], outcome: &Outcome) -> Vec<Pictur
                 deadline: deadlines.next().filter(|_| deadlines.next().is_none()),
                 bounds: vec![0.0],
                 scale: Variant::Linear,
-            }));
+            });
         }
         for input in part.inputs() {
             let (u, wanted) = (part.signal(&format!("u.{input}")), part.signal(&format!("u_ref.{input}")));
             let Some(signals) = all(vec![u]) else { continue };
-            pictures.push(Picture::Time(TimePicture {
+            add(TimePicture {
                 name: Some(part.file(&format!("u-{input}"))),
                 title: None,
                 signals,
@@ -64,7 +79,7 @@ pub fn usual(system: &System, models: &[Model], outcome: &Outcome) -> Vec<Pictur
                 deadline: None,
                 bounds: part.limits(input).into_iter().flatten().collect(),
                 scale: Variant::Linear,
-            }));
+            });
         }
     }
     pictures
@@ -260,7 +275,7 @@ fn planes(signals: &[(&str, Option<&str>)]) -> Vec<[usize; 2]> {
 }
 
 /// The paths of all components that move in a plane, with the sets of all filters.
-fn plane(parts: &[Part<'_>], recording: &Recording) -> Option<PathPicture> {
+fn plane(parts: &[Part<'_>], recording: &Recording) -> Option<Drawing> {
     let is_recorded = |signal: &String| recording.index_of(signal).is_some();
     let arrival = parts.iter().find_map(|part| Some(part.signal(&format!("{}.arrived", part.goal()?))));
     let arrival = arrival.filter(is_recorded);
@@ -299,7 +314,7 @@ fn plane(parts: &[Part<'_>], recording: &Recording) -> Option<PathPicture> {
     } else if let Some(first) = outlines.iter_mut().find(|outline| outline.obstacle) {
         first.label = "obstacle".to_owned();
     }
-    Some(PathPicture {
+    let picture = Picture::Path(PathPicture {
         name: Some("path".to_owned()),
         title: None,
         // With several vehicles it is not known whose arrival it is.
@@ -309,23 +324,23 @@ fn plane(parts: &[Part<'_>], recording: &Recording) -> Option<PathPicture> {
         label: Some(label),
         more,
         discs,
-        outlines,
-    })
+    });
+    Some(Drawing { picture, outlines })
 }
 
-/// Draws `picture` from `recording` into the SVG file `file`.
+/// Draws `drawing` from `recording` into the SVG file `file`.
 ///
 /// # Errors
 ///
 /// A signal that is not in the recording, nothing finite to draw, or a file that cannot be written.
-pub fn draw(picture: &Picture, recording: &Recording, file: &Path) -> Result<(), Error> {
-    match picture {
-        Picture::Path(picture) => plot::path(&path(picture, recording)?, file),
+pub fn draw(drawing: &Drawing, recording: &Recording, file: &Path) -> Result<(), Error> {
+    match &drawing.picture {
+        Picture::Path(picture) => plot::path(&path(picture, &drawing.outlines, recording)?, file),
         Picture::Time(picture) => plot::time(&time(picture, recording)?, file),
     }
 }
 
-fn path(picture: &PathPicture, recording: &Recording) -> Result<PathPlot, Error> {
+fn path(picture: &PathPicture, outlines: &[Outline], recording: &Recording) -> Result<PathPlot, Error> {
     let first = (&picture.x, &picture.y, &picture.label, &picture.arrival);
     let more = picture.more.iter().map(|entry| (&entry.x, &entry.y, &entry.label, &entry.arrival));
     let paths = std::iter::once(first)
@@ -359,7 +374,7 @@ fn path(picture: &PathPicture, recording: &Recording) -> Result<PathPlot, Error>
                 obstacle: disc.obstacle,
             })
             .collect(),
-        outlines: picture.outlines.clone(),
+        outlines: outlines.to_vec(),
     })
 }
 

@@ -10,7 +10,6 @@ use serde::Deserialize;
 use serde::de::{Deserializer, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 use crate::error::Error;
-use crate::outlines::Outline;
 use crate::text;
 
 /// A coupled system, read from a system file. Made only by [`System::parse`] and [`System::read`],
@@ -308,7 +307,6 @@ impl<'de> Visitor<'de> for PictureVisitor {
                 arrival: raw.arrival,
                 more: raw.more,
                 discs: raw.discs,
-                outlines: Vec::new(),
             }),
             PictureKind::Time => Picture::Time(TimePicture {
                 name: raw.name,
@@ -349,8 +347,6 @@ pub struct PathPicture {
     pub more: Vec<PathEntry>,
     /// Discs drawn beneath.
     pub discs: Vec<DiscEntry>,
-    /// Other sets drawn beneath, which no file can give.
-    pub outlines: Vec<Outline>,
 }
 
 /// A further path of a [`PathPicture`].
