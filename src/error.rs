@@ -9,7 +9,7 @@ use punctual_fmu::configuration::ConfigurationError;
 use serde::Serialize;
 
 use crate::codes;
-use crate::host::{LogMessage, Status};
+use crate::status::{LogMessage, Status};
 
 /// An error that keeps the command from being carried out.
 #[derive(Debug)]

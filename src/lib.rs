@@ -1,10 +1,11 @@
 //! The library behind the `punctual` command line: a host for co-simulation FMUs of FMI 2.0 and 3.0, the
 //! engine that couples them, recordings and pictures. `main.rs` only parses arguments.
 //!
-//! Each module uses only modules above it (`error` only names the statuses of `host`):
+//! Each module uses only modules above it:
 //!
 //! ```text
 //! codes                the exit codes, in one table
+//! status               the status of an FMI call, and log messages
 //! error                the errors of all commands, with names and numbers
 //! text                 files of text, and what is said of others in their place
 //! host                 one FMU: archive, description, library, instance
@@ -45,6 +46,7 @@ pub mod plot;
 pub mod recording;
 pub mod report;
 pub mod reproduce;
+pub mod status;
 pub mod text;
 pub mod validate;
 pub mod whole;

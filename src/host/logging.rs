@@ -7,13 +7,12 @@
 use std::cell::Cell;
 use std::collections::VecDeque;
 use std::ffi::{c_char, c_int, c_void};
-use std::fmt;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use punctual_fmu::fmi2::{self, CallbackFunctions, Text};
 use punctual_fmu::fmi3;
 
-use super::Status;
+use super::{LogMessage, Status};
 
 /// Messages kept per instance; older ones are dropped.
 const KEPT: usize = 8;
@@ -26,27 +25,6 @@ const TEXT: usize = 2047;
 
 /// The greatest number of bytes read of a text that is a value.
 const LONG_TEXT: usize = 1 << 20;
-
-/// One message of an FMU.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LogMessage {
-    /// The status the FMU gave with it.
-    pub status: Status,
-    /// The log category, empty where the FMU gave none.
-    pub category: String,
-    /// The finished text, at most 2047 bytes of it.
-    pub text: String,
-}
-
-impl fmt::Display for LogMessage {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "[{}", self.status)?;
-        if !self.category.is_empty() {
-            write!(f, ", {}", self.category)?;
-        }
-        write!(f, "] {}", self.text)
-    }
-}
 
 unsafe extern "C" {
     // Defined in `logger.c`.

@@ -13,7 +13,6 @@ mod library;
 mod logging;
 mod number;
 mod participant;
-mod status;
 
 use std::cell::{Cell, OnceCell};
 use std::path::Path;
@@ -29,16 +28,15 @@ pub(crate) use description::foreign_version;
 pub use description::{
     Array, Description, Fmi2Description, Fmi3Description, Output, Variable, Version, Written,
 };
-pub use logging::LogMessage;
 pub use number::{DataType, Family, whole_range};
 pub use participant::{Anew, Participant, Saved, Slave};
 pub use punctual_modeldescription::{Causality, DefaultExperiment, PLATFORM, Variability};
-pub use status::Status;
 
 pub(crate) use library::crash_at_once;
 use library::{Functions, Library};
 
 use crate::error::{Error, FmuProblem};
+pub use crate::status::{LogMessage, Status};
 
 /// An FMU: its archive unpacked, its description read, its library loaded when first needed.
 #[derive(Debug)]

@@ -1,4 +1,4 @@
-//! The status of a call or a message, in the words of its version of FMI.
+//! The status of a call or a message, in the words of its version of FMI; and messages.
 
 use std::fmt;
 
@@ -71,5 +71,26 @@ impl From<fmi2::Status> for Status {
 impl From<fmi3::Status> for Status {
     fn from(status: fmi3::Status) -> Self {
         Self::Fmi3(status)
+    }
+}
+
+/// One message of an FMU.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LogMessage {
+    /// The status the FMU gave with it.
+    pub status: Status,
+    /// The log category, empty where the FMU gave none.
+    pub category: String,
+    /// The finished text, at most 2047 bytes of it.
+    pub text: String,
+}
+
+impl fmt::Display for LogMessage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "[{}", self.status)?;
+        if !self.category.is_empty() {
+            write!(f, ", {}", self.category)?;
+        }
+        write!(f, "] {}", self.text)
     }
 }
