@@ -5,9 +5,8 @@ use std::f64::consts::TAU;
 
 use punctual_core::elementary;
 use punctual_core::filter::SafetyFilter;
+use punctual_cosim::error::Error;
 use punctual_fmu::configuration::{BarrierSection, FilterConfiguration, Shape, mentions};
-
-use crate::error::Error;
 
 /// Points of the outline of a round shape.
 const CORNERS: usize = 96;

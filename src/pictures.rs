@@ -2,20 +2,20 @@
 
 use std::path::Path;
 
+use punctual_cosim::coupling::{
+    Component, DiscEntry, Model, Outcome, PathEntry, PathPicture, Picture, StartValue, System, TimePicture,
+    Variant,
+};
+use punctual_cosim::error::Error;
+use punctual_cosim::host::Causality;
+use punctual_cosim::recording::Recording;
 use punctual_fmu::configuration::{
     BarrierSection, Configuration, FilterConfiguration, RESOURCE, Shape, UNBOUNDED,
 };
 use punctual_fmu::text::labelled;
 
-use crate::coupling::{
-    Component, DiscEntry, Model, Outcome, PathEntry, PathPicture, Picture, StartValue, System, TimePicture,
-    Variant,
-};
-use crate::error::Error;
-use crate::host::Causality;
 use crate::outlines::{self, Outline, Reads};
 use crate::plot::{self, Disc, Mark, PathPlot, Scale, Series, Style, TimePlot};
-use crate::recording::Recording;
 
 /// Percentiles between which [`Variant::Clipped`] shows values.
 const BULK: (f64, f64) = (1.0, 99.0);

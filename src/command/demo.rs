@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use punctual_cosim::error::Error;
 use serde::Serialize;
 
-use crate::error::Error;
 use crate::output::{self, Progress, number, quantity};
 use crate::reproduce::cases::{self, DEADLINE};
 use crate::reproduce::demo::{self, Run, Summary};

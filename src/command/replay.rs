@@ -3,15 +3,15 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use punctual_cosim::campaign::{self, Campaign, Choice, GROUP, Measures};
+use punctual_cosim::coupling::{Picture, Promise, System, TimePicture, Variant};
+use punctual_cosim::error::Error;
+use punctual_cosim::recording::Recording;
 use serde::Serialize;
 
 use super::run::{promises_text, stem, write_files};
-use crate::campaign::{self, Campaign, Choice, GROUP, Measures};
-use crate::coupling::{Picture, Promise, System, TimePicture, Variant};
-use crate::error::Error;
 use crate::output;
 use crate::pictures::Drawing;
-use crate::recording::Recording;
 
 /// Arguments of `punctual replay`.
 #[derive(Debug, clap::Args)]

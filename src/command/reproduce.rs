@@ -5,7 +5,8 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 use std::time::Instant;
 
-use crate::error::Error;
+use punctual_cosim::error::Error;
+
 use crate::output::{self, Progress};
 use crate::reproduce::{self, Options, Report, bicycles, guide};
 

@@ -8,22 +8,24 @@ use std::process::ExitCode;
 
 use clap::ValueEnum;
 use punctual_core::filter::Standing;
+use punctual_cosim::coupling::{
+    self, Interference, Kept, Model, Order, Outcome, Own, Promise, Simulation, System,
+};
+use punctual_cosim::error::Error;
+use punctual_cosim::host::journal;
+use punctual_cosim::isolation::{self, Child, End, Voice};
+use punctual_cosim::package;
+use punctual_cosim::recording::{self, Recording};
+use punctual_cosim::text;
+use punctual_cosim::whole;
 use punctual_fmu::configuration::{Configuration, FileKind, FilterConfiguration};
 use serde::Serialize;
 
 use super::check;
 use crate::codes;
-use crate::coupling::{self, Interference, Kept, Model, Order, Outcome, Own, Promise, Simulation, System};
-use crate::error::Error;
-use crate::host::journal;
-use crate::isolation::{self, Child, End, Voice};
 use crate::output::{self, Progress, number};
-use crate::package;
 use crate::pictures::{self, Drawing};
-use crate::recording::{self, Recording};
 use crate::report;
-use crate::text;
-use crate::whole;
 
 /// Arguments of `punctual run`.
 #[derive(Debug, clap::Args)]

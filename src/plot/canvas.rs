@@ -2,13 +2,12 @@
 
 use std::path::Path;
 
+use punctual_cosim::error::Error;
+use punctual_cosim::whole;
 use svg::node::element::{
     Circle, ClipPath, Definitions, Group, Path as Strokes, Polygon, Polyline, Rectangle, Text,
 };
 use svg::{Document, Node};
-
-use crate::error::Error;
-use crate::whole;
 
 /// Families in order of preference; the viewer has one of them.
 const FONT: &str = "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif";

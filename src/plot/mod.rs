@@ -13,9 +13,9 @@ mod time;
 
 use std::path::Path as File;
 
+use punctual_cosim::error::Error;
 use serde::Serialize;
 
-use crate::error::Error;
 use crate::outlines::Outline;
 use canvas::Canvas;
 pub use chart::{Chart, Curve, Scaling, seven_digits};

@@ -5,14 +5,14 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use punctual_core::elementary;
+use punctual_cosim::campaign::{
+    Campaign, Case, Cell, Distribution, Kind, Measures, Rate, Reader, Row, Sampling, Success, Summary,
+};
+use punctual_cosim::coupling::StartValue;
+use punctual_cosim::error::Error;
 use serde::Serialize;
 
 use super::table;
-use crate::campaign::{
-    Campaign, Case, Cell, Distribution, Kind, Measures, Rate, Reader, Row, Sampling, Success, Summary,
-};
-use crate::coupling::StartValue;
-use crate::error::Error;
 use crate::output::{labelled, number, shown_unit};
 use crate::page::{Page, escape, json};
 use crate::plot::{self, Chart, Curve, Mark, Scaling, Style, seven_digits};
@@ -185,7 +185,7 @@ fn axes(campaign: &Campaign, measures: &Measures, summary: &Summary) -> Vec<Axis
             .any(|spread| spread.column == name && spread.count > 0 && spread.min < spread.max)
     };
     let numbers = measures.columns().iter().enumerate().filter(|(_, column)| column.kind == Kind::Number);
-    let axis = |(c, column): (usize, &crate::campaign::Column)| {
+    let axis = |(c, column): (usize, &punctual_cosim::campaign::Column)| {
         let varied = campaign.varied().iter().find(|varied| varied.name == column.name);
         if varied.is_some_and(|varied| matches!(varied.distribution, Distribution::Seed)) {
             return None;
@@ -364,11 +364,12 @@ impl Counts {
 /// The deadline of `barrier` in s, where it is the same for all runs.
 fn deadline(barrier: &str, campaign: &Campaign) -> Option<f64> {
     let components = campaign.system().components().iter().zip(campaign.models());
-    let find = |(component, part): (&crate::coupling::Component, &crate::campaign::Part)| {
-        let variable = format!("{}.deadline", barrier.strip_prefix(&format!("{}.", component.name))?);
-        let own = &part.description().variables[part.description().index_of(&variable)?];
-        component.start.get(&variable).map_or(own.start, StartValue::number)
-    };
+    let find =
+        |(component, part): (&punctual_cosim::coupling::Component, &punctual_cosim::campaign::Part)| {
+            let variable = format!("{}.deadline", barrier.strip_prefix(&format!("{}.", component.name))?);
+            let own = &part.description().variables[part.description().index_of(&variable)?];
+            component.start.get(&variable).map_or(own.start, StartValue::number)
+        };
     components.filter_map(find).next().filter(|deadline| deadline.is_finite())
 }
 

@@ -6,14 +6,14 @@ mod scene;
 
 use std::fmt::Write;
 
+use punctual_cosim::coupling::{self, Kept, Model, Outcome, Promise, System};
+use punctual_cosim::recording::Recording;
 use serde::Serialize;
 
-use crate::coupling::{self, Kept, Model, Outcome, Promise, System};
 use crate::output::{labelled, number, quantity, shown_unit};
 use crate::page::{Page, escape, json};
 use crate::pictures::{self, Group, Part};
 use crate::plot::{self, Chart, Curve, Mark, POINTS, Scaling, Style};
-use crate::recording::Recording;
 use scene::{Outline, Strip, Vehicle};
 
 const SCRIPT: &str = include_str!("run.js");

@@ -1,13 +1,13 @@
 //! What moves on the page: vehicles, the outlines of barriers, and the status of filters over time.
 
 use punctual_core::filter::Status;
+use punctual_cosim::recording::Recording;
 use punctual_fmu::configuration::{BarrierSection, Shape};
 use serde::Serialize;
 
 use crate::outlines;
 use crate::pictures::Part;
 use crate::plot::{self, POINTS};
-use crate::recording::Recording;
 
 /// The states that are a heading, in rad from the x axis.
 const HEADING: &str = "x.theta";

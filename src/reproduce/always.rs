@@ -2,6 +2,7 @@
 //! backup.
 
 use punctual_core::elementary;
+use punctual_cosim::error::Error;
 use rayon::prelude::*;
 
 use punctual_core::barrier::Barrier;
@@ -19,7 +20,6 @@ use super::cases::{CENTRE, DEADLINE, Nominal, RADIUS, REAR, SMOOTHING, Setup, Ve
 use super::starts::{hundred, uniform};
 use super::table::{Cell, Table};
 use super::{Figure, Options, Watch};
-use crate::error::Error;
 use crate::plot::{Chart, Curve, Mark, Scaling, Style};
 
 /// Sampling period in s of all but the tube.

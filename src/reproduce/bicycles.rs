@@ -6,6 +6,7 @@ use punctual_core::dynamics::{DynPlant, Erased};
 use punctual_core::filter::{
     BarrierSettings, FilterBuilder, IntegratedFilter, Integration, SafetyFilter, Sampling,
 };
+use punctual_cosim::error::Error;
 use punctual_fmu::FilterLoop;
 use punctual_reference::plants::{Bicycle, KinematicBicycle, SmallSlipBicycle, Steering};
 use rayon::prelude::*;
@@ -15,7 +16,6 @@ use super::starts::hundred;
 use super::table::{Cell, Table};
 use super::trial::{Measured, Outcome};
 use super::{Options, Watch};
-use crate::error::Error;
 
 /// Deadline T in s.
 const DEADLINE: f64 = 5.0;

@@ -6,9 +6,8 @@ use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::elementary;
 use punctual_core::lie::{self, DerivativeSource};
 use punctual_core::nalgebra::SVector;
+use punctual_cosim::error::Error;
 use punctual_reference::plants::{Bicycle, PointMass, Signal, Signals, Unicycle};
-
-use crate::error::Error;
 
 /// Deadline in s of the runs from rest and of the pictures over time, as in the paper.
 pub const DEADLINE: f64 = 10.0;

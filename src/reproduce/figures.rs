@@ -1,6 +1,7 @@
 //! The pictures: the paper's two figures beside ours, and the effects of step and deadline.
 
 use punctual_core::elementary;
+use punctual_cosim::error::Error;
 use rayon::prelude::*;
 
 use super::baseline::Baseline;
@@ -8,7 +9,6 @@ use super::cases::{self, CENTRE, DEADLINE, Nominal, RADIUS, STEP, Setup, Vehicle
 use super::table::{Cell, Table};
 use super::trial::{self, Outcome};
 use super::{Figure, Options, always};
-use crate::error::Error;
 use crate::plot::{Chart, Curve, Disc, Mark, Scaling, Style};
 
 /// Points of a curve.

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
+use punctual_cosim::error::Error;
+
 use super::{Options, Watch, always, figures, tables, write};
-use crate::error::Error;
 use crate::plot;
 
 /// Options of the guide's runs: steps that a test has the time for, and random starts for the one table that has some.

@@ -21,11 +21,11 @@ pub mod trial;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use punctual_cosim::error::Error;
+use punctual_cosim::whole;
 use serde::Serialize;
 
-use crate::error::Error;
 use crate::plot::{self, Chart};
-use crate::whole;
 pub use cases::{Setup, Vehicle};
 pub use table::{Cell, Table};
 

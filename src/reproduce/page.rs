@@ -1,7 +1,8 @@
 //! The report as one page of HTML: tables, and pictures that can be zoomed and read off.
 
+use punctual_cosim::error::Error;
+
 use super::{Figure, Report, Table};
-use crate::error::Error;
 use crate::page::{Page, escape};
 use crate::plot;
 

@@ -2,12 +2,12 @@
 
 use std::cmp::Ordering;
 
+use punctual_cosim::error::Error;
 use rayon::prelude::*;
 
 use super::baseline::Baseline;
 use super::starts::drawn;
 use super::{Options, Setup, Vehicle, Watch, trial};
-use crate::error::Error;
 
 /// Seed of the starts that parameters are chosen on, which no table uses.
 pub const SEED: u64 = 1000;

@@ -1,5 +1,6 @@
 //! The tables: the paper's three, the methods on the same starts, other seeds.
 
+use punctual_cosim::error::Error;
 use rayon::prelude::*;
 
 use super::baseline::Baseline;
@@ -8,7 +9,6 @@ use super::starts::{drawn, hundred};
 use super::table::{Cell, Table};
 use super::trial::{self, Outcome};
 use super::{Options, Watch, always, search};
-use crate::error::Error;
 
 /// Deadline of the random starts in s.
 const RANDOM: f64 = 5.0;

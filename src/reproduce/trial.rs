@@ -5,11 +5,11 @@ use std::time::Instant;
 use punctual_core::elementary;
 use punctual_core::filter::{Report, SafetyFilter};
 use punctual_core::nalgebra::SVector;
+use punctual_cosim::error::Error;
 use punctual_reference::simulation::{Schedule, closed_loop_by};
 
 use super::baseline::Baseline;
 use super::cases::{CENTRE, RADIUS, Setup, Vehicle};
-use crate::error::Error;
 
 /// One sample of a loop.
 pub struct Sample<'a> {

@@ -10,14 +10,14 @@ pub use summary::Summary;
 
 use std::path::Path;
 
+use punctual_cosim::coupling::{self, Kept, Model, Own, Promise, Simulation, System};
+use punctual_cosim::error::Error;
+use punctual_cosim::package;
+use punctual_cosim::recording::Recording;
 use punctual_fmu::configuration::Configuration;
 
 use super::cases::DEADLINE;
 use super::{Vehicle, write};
-use crate::coupling::{self, Kept, Model, Own, Promise, Simulation, System};
-use crate::error::Error;
-use crate::package;
-use crate::recording::Recording;
 use crate::report;
 
 /// One coupled run.

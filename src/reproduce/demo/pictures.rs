@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use punctual_core::elementary;
+use punctual_cosim::error::Error;
+use punctual_cosim::recording::Recording;
 
 use super::Run;
-use crate::error::Error;
 use crate::plot::{self, Disc, Mark, PathPlot, Region, Scale, Series, Style, TimePlot};
-use crate::recording::Recording;
 use crate::reproduce::cases::{self, CENTRE, DEADLINE, RADIUS, Vehicle};
 
 /// Draws all pictures of `vehicle` into `folder`.

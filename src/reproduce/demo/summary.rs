@@ -1,10 +1,10 @@
 //! The numbers of one run.
 
+use punctual_cosim::error::Error;
+use punctual_cosim::recording::Recording;
 use serde::Serialize;
 
 use super::Case;
-use crate::error::Error;
-use crate::recording::Recording;
 use crate::reproduce::trial::{Measured, Outcome};
 
 /// Numbers of one run.

@@ -1,4 +1,4 @@
-//! The one error type of the command line's library. It tells what went wrong, with the names and numbers needed
+//! The one error type of co-simulation and of all that stands on it. It tells what went wrong, with the names and numbers needed
 //! to mend it, and its exit code.
 
 use std::fmt;
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use punctual_fmu::configuration::ConfigurationError;
 use serde::Serialize;
 
-use crate::codes;
+use crate::exit;
 use crate::status::{LogMessage, Status};
 
 /// An error that keeps the command from being carried out.
@@ -295,12 +295,12 @@ impl Error {
         }
     }
 
-    /// The exit code, one of [`codes`]: whether an FMU is at fault, a configuration or a file, or it was Ctrl-C.
+    /// The exit code, one of [`exit`]: whether an FMU is at fault, a configuration or a file, or it was Ctrl-C.
     pub fn exit_code(&self) -> u8 {
         match &*self.0 {
-            Kind::Fmu { .. } | Kind::Call(_) | Kind::Broken { .. } => codes::FOUND,
-            Kind::Configuration { .. } | Kind::Io { .. } | Kind::Plot { .. } => codes::MISUSE,
-            Kind::Interrupted { .. } => codes::INTERRUPTED,
+            Kind::Fmu { .. } | Kind::Call(_) | Kind::Broken { .. } => exit::FOUND,
+            Kind::Configuration { .. } | Kind::Io { .. } | Kind::Plot { .. } => exit::MISUSE,
+            Kind::Interrupted { .. } => exit::INTERRUPTED,
         }
     }
 }

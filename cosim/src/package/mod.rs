@@ -30,9 +30,9 @@ const LICENCE: (&str, &str) = (
          License 2.0, at your option; both follow. They are linked with crates of others, under these and like licences,\n\
          whose texts are in LICENSES-THIRD-PARTY.txt of a release of Punctual. What the configuration in resources/ says\n\
          is its author's.\n\n",
-        include_str!("../../LICENSE-MIT"),
+        include_str!("../../../LICENSE-MIT"),
         "\n\n",
-        include_str!("../../LICENSE-APACHE"),
+        include_str!("../../../LICENSE-APACHE"),
     ),
 );
 

@@ -158,7 +158,7 @@ fn write_number(out: &mut impl Write, value: f64) -> io::Result<()> {
 }
 
 /// A CSV field, in quotes where it needs them.
-pub(crate) fn quoted(text: &str) -> String {
+pub fn quoted(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", text.replace('"', "\"\""))
     } else {
