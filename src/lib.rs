@@ -5,12 +5,7 @@
 //!
 //! ```text
 //! codes                the exit codes, in one table
-//! outlines             the edges of safe sets in a plane
-//! plot                 pictures of series; knows no FMU
-//! page                 a page of HTML with charts
-//! pictures             from a system file's plots and a recording to pictures
 //! output               the one place that prints
-//! report               a run as a page, with an animation; a campaign as a page
 //! reproduce            the study: the paper's tables and figures beside ours and the literature's; the demonstration
 //! command              one thin function per subcommand
 //! ```
@@ -20,10 +15,5 @@
 
 pub mod codes;
 pub mod command;
-pub mod outlines;
 pub mod output;
-pub mod page;
-pub mod pictures;
-pub mod plot;
-pub mod report;
 pub mod reproduce;

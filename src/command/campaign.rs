@@ -9,12 +9,12 @@ use punctual_cosim::campaign::{self, Campaign, Measures, Options, Progress, Rare
 use punctual_cosim::error::Error;
 use punctual_cosim::whole;
 use punctual_fmu::configuration::Configuration;
+use punctual_pictures::report::campaign::{Pages, pages as campaign_pages};
 use serde::Serialize;
 
 use super::run::stem;
 use crate::codes::INTERRUPTED;
 use crate::output::{self, Counter, number};
-use crate::report::campaign::{Pages, pages as campaign_pages};
 
 /// Lines of a list that are printed at once.
 const AT_ONCE: usize = 1000;

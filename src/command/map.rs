@@ -10,11 +10,11 @@ use punctual_core::plan::{Failure, Witness};
 use punctual_cosim::error::Error;
 use punctual_cosim::whole;
 use punctual_fmu::configuration::{FilterConfiguration, Shape};
+use punctual_pictures::plot::{self, Disc, MapPlot, Mark, PathPlot, Series, Style, TimePlot};
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::output::{Progress, labelled};
-use crate::plot::{self, Disc, MapPlot, Mark, PathPlot, Series, Style, TimePlot};
 
 /// Points of a plan, about.
 const POINTS: f64 = 400.0;

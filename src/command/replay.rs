@@ -7,11 +7,11 @@ use punctual_cosim::campaign::{self, Campaign, Choice, GROUP, Measures};
 use punctual_cosim::coupling::{Picture, Promise, System, TimePicture, Variant};
 use punctual_cosim::error::Error;
 use punctual_cosim::recording::Recording;
+use punctual_pictures::drawing::Drawing;
 use serde::Serialize;
 
 use super::run::{promises_text, stem, write_files};
 use crate::output;
-use crate::pictures::Drawing;
 
 /// Arguments of `punctual replay`.
 #[derive(Debug, clap::Args)]

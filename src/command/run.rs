@@ -19,13 +19,13 @@ use punctual_cosim::recording::{self, Recording};
 use punctual_cosim::text;
 use punctual_cosim::whole;
 use punctual_fmu::configuration::{Configuration, FileKind, FilterConfiguration};
+use punctual_pictures::drawing::{self, Drawing};
+use punctual_pictures::report;
 use serde::Serialize;
 
 use super::check;
 use crate::codes;
 use crate::output::{self, Progress, number};
-use crate::pictures::{self, Drawing};
-use crate::report;
 
 /// Arguments of `punctual run`.
 #[derive(Debug, clap::Args)]
@@ -272,7 +272,7 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
     let mut files = Vec::new();
     if let Some(folder) = &out {
         let usual = match system.pictures() {
-            [] => pictures::usual(&system, &models, &outcome),
+            [] => drawing::usual(&system, &models, &outcome),
             asked => asked.iter().cloned().map(Drawing::from).collect(),
         };
         files = write_files(&usual, &stem(path), folder, &outcome.recording, arguments.units)?;
@@ -338,7 +338,7 @@ pub(super) fn write_files(
     for (i, drawing) in pictures.iter().enumerate() {
         let name = drawing.picture.name().map_or_else(|| (i + 1).to_string(), str::to_owned);
         let file = folder.join(format!("{stem}-{name}.svg"));
-        pictures::draw(drawing, recording, &file)?;
+        drawing::draw(drawing, recording, &file)?;
         files.push(file);
     }
     Ok(files.iter().map(|file| file.display().to_string()).collect())

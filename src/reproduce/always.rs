@@ -3,6 +3,7 @@
 
 use punctual_core::elementary;
 use punctual_cosim::error::Error;
+use punctual_pictures::plot::{Chart, Curve, Mark, Scaling, Style};
 use rayon::prelude::*;
 
 use punctual_core::barrier::Barrier;
@@ -20,7 +21,6 @@ use super::cases::{CENTRE, DEADLINE, Nominal, RADIUS, REAR, SMOOTHING, Setup, Ve
 use super::starts::{hundred, uniform};
 use super::table::{Cell, Table};
 use super::{Figure, Options, Watch};
-use crate::plot::{Chart, Curve, Mark, Scaling, Style};
 
 /// Sampling period in s of all but the tube.
 const PERIOD: f64 = 0.05;

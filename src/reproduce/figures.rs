@@ -2,6 +2,7 @@
 
 use punctual_core::elementary;
 use punctual_cosim::error::Error;
+use punctual_pictures::plot::{Chart, Curve, Disc, Mark, Scaling, Style};
 use rayon::prelude::*;
 
 use super::baseline::Baseline;
@@ -9,7 +10,6 @@ use super::cases::{self, CENTRE, DEADLINE, Nominal, RADIUS, STEP, Setup, Vehicle
 use super::table::{Cell, Table};
 use super::trial::{self, Outcome};
 use super::{Figure, Options, always};
-use crate::plot::{Chart, Curve, Disc, Mark, Scaling, Style};
 
 /// Points of a curve.
 const POINTS: usize = 800;

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use punctual_cosim::error::Error;
+use punctual_pictures::plot;
 
 use super::{Options, Watch, always, figures, tables, write};
-use crate::plot;
 
 /// Options of the guide's runs: steps that a test has the time for, and random starts for the one table that has some.
 const OPTIONS: Options = Options { runs: 20, finest: 1e-3, ..Options::QUICK };

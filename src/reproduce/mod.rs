@@ -23,9 +23,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use punctual_cosim::error::Error;
 use punctual_cosim::whole;
+use punctual_pictures::plot::{self, Chart};
 use serde::Serialize;
 
-use crate::plot::{self, Chart};
 pub use cases::{Setup, Vehicle};
 pub use table::{Cell, Table};
 

@@ -1,10 +1,10 @@
 //! The report as one page of HTML: tables, and pictures that can be zoomed and read off.
 
 use punctual_cosim::error::Error;
+use punctual_pictures::page::{Page, escape};
+use punctual_pictures::plot;
 
 use super::{Figure, Report, Table};
-use crate::page::{Page, escape};
-use crate::plot;
 
 /// The page.
 ///

@@ -1,9 +1,8 @@
 //! A table of words and numbers, for people, spreadsheets and programs.
 
+use punctual_pictures::columns;
+use punctual_pictures::page::escape;
 use serde::{Serialize, Serializer};
-
-use crate::output;
-use crate::page::escape;
 
 /// One cell.
 #[derive(Clone, Debug, PartialEq)]
@@ -111,7 +110,7 @@ impl Table {
         rows.extend(self.rows.iter().map(|row| row.iter().map(Cell::shown).collect()));
         let right: Vec<bool> = (0..self.header.len()).map(|c| self.is_number(c)).collect();
         let notes: String = self.notes.iter().map(|note| format!("{note}\n")).collect();
-        format!("{}\n{notes}\n{}\n", self.title, output::table(&rows, &right))
+        format!("{}\n{notes}\n{}\n", self.title, columns::table(&rows, &right))
     }
 
     /// The table as CSV: a header and rows, numbers in full.

@@ -39,6 +39,7 @@ fn crates_depend_on_crates_below_them_only() {
             &["punctual-core", "punctual-modeldescription", "punctual-models", "punctual-reference"],
         ),
         ("cosim/Cargo.toml", &["punctual-core", "punctual-fmu", "punctual-modeldescription"]),
+        ("pictures/Cargo.toml", &["punctual-core", "punctual-cosim", "punctual-fmu"]),
         ("python/Cargo.toml", &["punctual-core", "punctual-fmu"]),
         (
             "Cargo.toml",
@@ -47,6 +48,7 @@ fn crates_depend_on_crates_below_them_only() {
                 "punctual-cosim",
                 "punctual-fmu",
                 "punctual-modeldescription",
+                "punctual-pictures",
                 "punctual-reference",
                 // The interior-point method and the models, for benchmarks.
                 "punctual-core",
@@ -89,6 +91,7 @@ fn each_heavy_dependency_belongs_to_one_crate() {
         "models/Cargo.toml",
         "fmu/Cargo.toml",
         "cosim/Cargo.toml",
+        "pictures/Cargo.toml",
         "python/Cargo.toml",
     ] {
         let dependencies = manifest(path).dependencies;
@@ -246,7 +249,7 @@ fn modules_of_the_python_module_use_modules_above_them() {
 /// The orders of the lists in src/lib.rs and in those of the crates below the command line.
 #[test]
 fn modules_of_the_command_line_use_modules_above_them() {
-    for folder in ["src/", "cosim/src/"] {
+    for folder in ["src/", "cosim/src/", "pictures/src/"] {
         let mut inside = false;
         let documented = documented(&format!("{folder}lib.rs"), |line| {
             let fence = line.starts_with("//! ```");
@@ -298,7 +301,7 @@ fn each_dependency_is_named_in_one_place() {
                 "src/command/inspect",
             ],
         ),
-        (&["svg", ":", ":"], &["src/plot/canvas.rs"]),
+        (&["svg", ":", ":"], &["pictures/src/plot/canvas.rs"]),
         (&["indicatif", ":", ":"], &["src/output.rs"]),
         (&["parquet", ":", ":"], &["cosim/src/campaign/table.rs"]),
         (&["flatbuffers", ":", ":"], &["cosim/src/campaign/arrow.rs"]),
@@ -322,7 +325,7 @@ fn each_dependency_is_named_in_one_place() {
         ),
         (&["statrs", ":", ":"], &["cosim/src/campaign/distribution.rs"]),
         (&["ctrlc", ":", ":"], &["src/command/mod.rs"]),
-        (&["console", ":", ":"], &["src/output.rs"]),
+        (&["console", ":", ":"], &["src/output.rs", "pictures/src/columns.rs"]),
         (&["clap_complete", ":", ":"], &["src/command/shell.rs"]),
         (&["clap_mangen", ":", ":"], &["src/command/shell.rs"]),
     ];

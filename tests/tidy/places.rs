@@ -12,6 +12,7 @@ fn every_crate_root_speaks_on_unsafe_code() {
         ("fmu/src/lib.rs", "deny"),
         ("python/src/lib.rs", "forbid"),
         ("cosim/src/lib.rs", "deny"),
+        ("pictures/src/lib.rs", "forbid"),
         ("src/lib.rs", "forbid"),
         ("src/main.rs", "forbid"),
     ];

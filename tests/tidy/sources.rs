@@ -67,6 +67,7 @@ pub(crate) fn crates() -> impl Iterator<Item = &'static Source> {
         "models/src/",
         "fmu/src/",
         "cosim/src/",
+        "pictures/src/",
         "python/src/",
     ];
     SOURCES.iter().filter(move |source| folders.iter().any(|folder| source.path.starts_with(folder)))

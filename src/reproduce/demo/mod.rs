@@ -15,10 +15,10 @@ use punctual_cosim::error::Error;
 use punctual_cosim::package;
 use punctual_cosim::recording::Recording;
 use punctual_fmu::configuration::Configuration;
+use punctual_pictures::report;
 
 use super::cases::DEADLINE;
 use super::{Vehicle, write};
-use crate::report;
 
 /// One coupled run.
 pub struct Run {

@@ -5,9 +5,9 @@ use std::path::Path;
 use punctual_core::elementary;
 use punctual_cosim::error::Error;
 use punctual_cosim::recording::Recording;
+use punctual_pictures::plot::{self, Disc, Mark, PathPlot, Region, Scale, Series, Style, TimePlot};
 
 use super::Run;
-use crate::plot::{self, Disc, Mark, PathPlot, Region, Scale, Series, Style, TimePlot};
 use crate::reproduce::cases::{self, CENTRE, DEADLINE, RADIUS, Vehicle};
 
 /// Draws all pictures of `vehicle` into `folder`.

@@ -5,8 +5,8 @@ use punctual_cosim::recording::Recording;
 use punctual_fmu::configuration::{BarrierSection, Shape};
 use serde::Serialize;
 
+use crate::drawing::Part;
 use crate::outlines;
-use crate::pictures::Part;
 use crate::plot::{self, POINTS};
 
 /// The states that are a heading, in rad from the x axis.

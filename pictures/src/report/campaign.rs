@@ -10,10 +10,10 @@ use punctual_cosim::campaign::{
 };
 use punctual_cosim::coupling::StartValue;
 use punctual_cosim::error::Error;
+use punctual_fmu::text::{labelled, number, shown_unit};
 use serde::Serialize;
 
 use super::table;
-use crate::output::{labelled, number, shown_unit};
 use crate::page::{Page, escape, json};
 use crate::plot::{self, Chart, Curve, Mark, Scaling, Style, seven_digits};
 

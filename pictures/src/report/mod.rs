@@ -8,11 +8,11 @@ use std::fmt::Write;
 
 use punctual_cosim::coupling::{self, Kept, Model, Outcome, Promise, System};
 use punctual_cosim::recording::Recording;
+use punctual_fmu::text::{labelled, number, quantity, shown_unit};
 use serde::Serialize;
 
-use crate::output::{labelled, number, quantity, shown_unit};
+use crate::drawing::{self, Group, Part};
 use crate::page::{Page, escape, json};
-use crate::pictures::{self, Group, Part};
 use crate::plot::{self, Chart, Curve, Mark, POINTS, Scaling, Style};
 use scene::{Outline, Strip, Vehicle};
 
@@ -45,7 +45,7 @@ pub fn document(
     notes: &[String],
 ) -> String {
     let recording = &outcome.recording;
-    let parts = pictures::parts(system, models);
+    let parts = drawing::parts(system, models);
     let mut charts: Vec<(String, Chart)> = Vec::new();
     let times = recording.times();
     let time = [times.first(), times.last()].map(|t| t.copied().unwrap_or_default());
