@@ -40,6 +40,10 @@ fn crates_depend_on_crates_below_them_only() {
         ),
         ("cosim/Cargo.toml", &["punctual-core", "punctual-fmu", "punctual-modeldescription"]),
         ("pictures/Cargo.toml", &["punctual-core", "punctual-cosim", "punctual-fmu"]),
+        (
+            "study/Cargo.toml",
+            &["punctual-core", "punctual-cosim", "punctual-fmu", "punctual-pictures", "punctual-reference"],
+        ),
         ("python/Cargo.toml", &["punctual-core", "punctual-fmu"]),
         (
             "Cargo.toml",
@@ -50,6 +54,7 @@ fn crates_depend_on_crates_below_them_only() {
                 "punctual-modeldescription",
                 "punctual-pictures",
                 "punctual-reference",
+                "punctual-study",
                 // The interior-point method and the models, for benchmarks.
                 "punctual-core",
                 "punctual-models",
@@ -92,6 +97,7 @@ fn each_heavy_dependency_belongs_to_one_crate() {
         "fmu/Cargo.toml",
         "cosim/Cargo.toml",
         "pictures/Cargo.toml",
+        "study/Cargo.toml",
         "python/Cargo.toml",
     ] {
         let dependencies = manifest(path).dependencies;
@@ -249,7 +255,7 @@ fn modules_of_the_python_module_use_modules_above_them() {
 /// The orders of the lists in src/lib.rs and in those of the crates below the command line.
 #[test]
 fn modules_of_the_command_line_use_modules_above_them() {
-    for folder in ["src/", "cosim/src/", "pictures/src/"] {
+    for folder in ["src/", "cosim/src/", "pictures/src/", "study/src/"] {
         let mut inside = false;
         let documented = documented(&format!("{folder}lib.rs"), |line| {
             let fence = line.starts_with("//! ```");
@@ -313,7 +319,7 @@ fn each_dependency_is_named_in_one_place() {
                 "cosim/src/campaign/runner.rs",
                 "cosim/src/campaign/splitting.rs",
                 "src/command/map.rs",
-                "src/reproduce/",
+                "study/src/",
                 "python/src/pool.rs",
                 "python/src/batch.rs",
             ],

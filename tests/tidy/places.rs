@@ -13,6 +13,7 @@ fn every_crate_root_speaks_on_unsafe_code() {
         ("python/src/lib.rs", "forbid"),
         ("cosim/src/lib.rs", "deny"),
         ("pictures/src/lib.rs", "forbid"),
+        ("study/src/lib.rs", "forbid"),
         ("src/lib.rs", "forbid"),
         ("src/main.rs", "forbid"),
     ];

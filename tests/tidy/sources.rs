@@ -68,6 +68,7 @@ pub(crate) fn crates() -> impl Iterator<Item = &'static Source> {
         "fmu/src/",
         "cosim/src/",
         "pictures/src/",
+        "study/src/",
         "python/src/",
     ];
     SOURCES.iter().filter(move |source| folders.iter().any(|folder| source.path.starts_with(folder)))

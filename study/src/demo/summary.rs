@@ -5,7 +5,7 @@ use punctual_cosim::recording::Recording;
 use serde::Serialize;
 
 use super::Case;
-use crate::reproduce::trial::{Measured, Outcome};
+use crate::trial::{Measured, Outcome};
 
 /// Numbers of one run.
 #[derive(Clone, Debug, PartialEq, Serialize)]

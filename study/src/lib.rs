@@ -3,6 +3,27 @@
 //! Tables and figures run in process: the filter of `punctual-core`, a plant that moves by the integrator named,
 //! inputs held between samples. Every number except the times is a pure function of the options. [`demo`] runs
 //! its cases through FMI.
+//!
+//! Each module uses only modules above it:
+//!
+//! ```text
+//! starts               random starts, those of a file and those drawn
+//! cases                vehicles, settings and nominal controllers
+//! table                rows of cells: text, CSV, JSON, Markdown, HTML
+//! baseline             the methods that are compared
+//! trial                one closed loop, and what is measured of it
+//! search               the best parameters of a method
+//! always               what survives bounds and any u_ref
+//! bicycles             the kinematic bicycle's models and remedies
+//! figures              all figures
+//! tables               all tables
+//! page                 tables and figures as a page
+//! guide                pictures and numbers of docs/guide.md
+//! demo                 the demonstration, through FMI
+//! ```
+#![forbid(unsafe_code)]
+// Elementary functions are those of the core: clippy.toml.
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 pub mod always;
 pub mod baseline;
@@ -119,14 +140,10 @@ pub fn run(options: Options, tell: &(dyn Fn(f64) + Sync)) -> Result<Report, Erro
 pub fn save(report: &Report, folder: &Path) -> Result<(), Error> {
     std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
     for table in &report.tables {
-        write(&folder.join(format!("{}.csv", table.key)), &table.csv())?;
+        whole::write(&folder.join(format!("{}.csv", table.key)), &table.csv())?;
     }
     for figure in &report.figures {
-        write(&folder.join(format!("{}.svg", figure.key)), &plot::chart(&figure.chart, &figure.key)?)?;
+        whole::write(&folder.join(format!("{}.svg", figure.key)), &plot::chart(&figure.chart, &figure.key)?)?;
     }
-    write(&folder.join("report.html"), &page::document(report)?)
-}
-
-pub(crate) fn write(path: &Path, text: &str) -> Result<(), Error> {
-    whole::write(path, text)
+    whole::write(&folder.join("report.html"), &page::document(report)?)
 }

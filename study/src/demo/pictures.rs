@@ -8,7 +8,7 @@ use punctual_cosim::recording::Recording;
 use punctual_pictures::plot::{self, Disc, Mark, PathPlot, Region, Scale, Series, Style, TimePlot};
 
 use super::Run;
-use crate::reproduce::cases::{self, CENTRE, DEADLINE, RADIUS, Vehicle};
+use crate::cases::{self, CENTRE, DEADLINE, RADIUS, Vehicle};
 
 /// Draws all pictures of `vehicle` into `folder`.
 pub(super) fn draw(vehicle: Vehicle, paper: &Run, ours: &Run, folder: &Path) -> Result<(), Error> {

@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use punctual_cosim::error::Error;
+use punctual_cosim::whole;
 use punctual_pictures::plot;
 
-use super::{Options, Watch, always, figures, tables, write};
+use super::{Options, Watch, always, figures, tables};
 
 /// Options of the guide's runs: steps that a test has the time for, and random starts for the one table that has some.
 const OPTIONS: Options = Options { runs: 20, finest: 1e-3, ..Options::QUICK };
@@ -66,7 +67,7 @@ pub fn update(folder: &Path) -> Result<(), Error> {
     std::fs::create_dir_all(&pictures).map_err(|e| Error::io("create", &pictures, e))?;
     for figure in figures.iter().filter(|figure| PICTURES.contains(&figure.key.as_str())) {
         let svg = plot::chart(&figure.chart, &figure.key)?;
-        write(&pictures.join(format!("{}.svg", figure.key)), &svg)?;
+        whole::write(&pictures.join(format!("{}.svg", figure.key)), &svg)?;
     }
-    write(&path, &out)
+    whole::write(&path, &out)
 }

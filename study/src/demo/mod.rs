@@ -14,11 +14,12 @@ use punctual_cosim::coupling::{self, Kept, Model, Own, Promise, Simulation, Syst
 use punctual_cosim::error::Error;
 use punctual_cosim::package;
 use punctual_cosim::recording::Recording;
+use punctual_cosim::whole;
 use punctual_fmu::configuration::Configuration;
 use punctual_pictures::report;
 
+use super::Vehicle;
 use super::cases::DEADLINE;
-use super::{Vehicle, write};
 
 /// One coupled run.
 pub struct Run {
@@ -76,7 +77,7 @@ fn couple(
 ) -> Result<Run, Error> {
     build(folder, &case.filter_stem(), &case.filter(), library)?;
     let text = case.system();
-    write(&folder.join(format!("{}.toml", case.stem())), &text)?;
+    whole::write(&folder.join(format!("{}.toml", case.stem())), &text)?;
     let (mut simulation, _) = Simulation::new(&System::parse(&text)?, folder, package::read_configuration)?;
     let outcome = simulation.run(|time, _| progress(time / case.setup.end))?;
     if let Some(failure) = outcome.failure {
@@ -91,7 +92,7 @@ fn couple(
 fn alone(case: Case, folder: &Path, mut progress: impl FnMut(f64)) -> Result<Run, Error> {
     let name = format!("{}.toml", case.stem());
     let (path, text) = (folder.join(&name), case.alone());
-    write(&path, &text)?;
+    whole::write(&path, &text)?;
     let in_file = |e: Error| e.in_file(&path);
     let (text, configurations) =
         coupling::alone(Configuration::parse(&text).map_err(|e| in_file(e.into()))?)?;
@@ -105,7 +106,7 @@ fn alone(case: Case, folder: &Path, mut progress: impl FnMut(f64)) -> Result<Run
     }
     outcome.recording.save_csv(&path.with_extension("csv"), false)?;
     let page = report::document(&name, &system, &models, &outcome, &outcome.notes);
-    write(&path.with_extension("html"), &page)?;
+    whole::write(&path.with_extension("html"), &page)?;
     let summary = Summary::new(&case, &outcome.recording, outcome.statistics.steps_per_second())?;
     Ok(Run { case, recording: outcome.recording, promises: outcome.promises, summary })
 }
@@ -113,7 +114,7 @@ fn alone(case: Case, folder: &Path, mut progress: impl FnMut(f64)) -> Result<Run
 /// Writes a configuration and the FMU made from it.
 fn build(folder: &Path, stem: &str, text: &str, library: Option<&Path>) -> Result<(), Error> {
     let path = folder.join(format!("{stem}.toml"));
-    write(&path, text)?;
+    whole::write(&path, text)?;
     let configuration = Configuration::parse(text).map_err(|e| Error::from(e).in_file(&path))?;
     package::build(
         configuration,

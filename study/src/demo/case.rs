@@ -2,8 +2,8 @@
 
 use punctual_core::filter::Sampling;
 
-use crate::reproduce::baseline::Baseline;
-use crate::reproduce::cases::{CENTRE, DEADLINE, Nominal, RADIUS, STEP, Setup, Shape, Vehicle};
+use crate::baseline::Baseline;
+use crate::cases::{CENTRE, DEADLINE, Nominal, RADIUS, STEP, Setup, Shape, Vehicle};
 
 /// Sampling period of the hindered vehicles, in s.
 const HINDERED_STEP: f64 = 0.01;
