@@ -7,7 +7,7 @@ use punctual_fmu::configuration::nearest;
 use punctual_fmu::units::{self, Fit};
 
 use super::graph::{self, Edge};
-use super::starts::{self, Start};
+use super::starts::{self, Start, sizes};
 use super::system::{Component, Picture, System};
 use crate::error::Error;
 use crate::host::{Array, Causality, DataType, Description, Family, Output, Variability, Variable};
@@ -617,11 +617,6 @@ impl<'a> Resolver<'a> {
             .collect();
         (direct, delayed, notes)
     }
-}
-
-/// The sizes of an array, as in `[2, 3]`.
-pub(super) fn sizes(of: &[usize]) -> String {
-    format!("{of:?}")
 }
 
 /// What a variable holds that is no number.

@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use punctual_fmu::configuration::{self, ConfigurationError};
 
-use super::network::sizes;
 use super::system::{Component, StartValue};
 use crate::error::Error;
 use crate::host::{Causality, DataType, Description, Family, Variable, whole_range};
@@ -207,4 +206,9 @@ fn range(min: f64, max: f64, unit: &str) -> String {
         (true, false) => format!("≥ {min}{unit}"),
         _ => format!("≤ {max}{unit}"),
     }
+}
+
+/// The sizes of an array, as in `[2, 3]`.
+pub(super) fn sizes(of: &[usize]) -> String {
+    format!("{of:?}")
 }
