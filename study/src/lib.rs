@@ -140,7 +140,7 @@ pub fn run(options: Options, tell: &(dyn Fn(f64) + Sync)) -> Result<Report, Erro
 pub fn save(report: &Report, folder: &Path) -> Result<(), Error> {
     std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
     for table in &report.tables {
-        whole::write(&folder.join(format!("{}.csv", table.key)), &table.csv())?;
+        whole::write(&folder.join(format!("{}.csv", table.key)), table.csv())?;
     }
     for figure in &report.figures {
         whole::write(&folder.join(format!("{}.svg", figure.key)), &plot::chart(&figure.chart, &figure.key)?)?;
