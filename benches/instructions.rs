@@ -3,12 +3,12 @@
 
 use std::hint::black_box;
 
-use punctual::coupling::{InProcess, Own, Simulation, System, alone};
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{FilterBuilder, Sampling};
 use punctual_core::lie::{self, DerivativeSource, Derivatives};
 use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 use punctual_core::qp::{Bounds, Outcome, Problem, Row, Workspace};
+use punctual_cosim::coupling::{InProcess, Own, Simulation, System, alone};
 use punctual_fmu::configuration::{Configuration, FilterConfiguration};
 use support::{
     ByHand, Drive, Integrators, SAFE, T, X, anchored, disc, goal, goal_and_obstacles, obstructed, promise,

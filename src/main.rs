@@ -1,6 +1,6 @@
 //! The `punctual` command line: arguments in, exit code out. The commands stand in [`punctual::command`]; nothing
 //! is printed but through [`punctual::output`].
-#![deny(unsafe_code)]
+#![forbid(unsafe_code)]
 // Elementary functions are those of the core: clippy.toml.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
@@ -11,8 +11,8 @@ use punctual::codes;
 use punctual::command::{
     build, campaign, check, demo, inspect, merge, new, replay, reproduce, run, shell, validate,
 };
-use punctual::error::Details;
 use punctual::output;
+use punctual_cosim::error::Details;
 use serde::Serialize;
 
 /// A safety filter that keeps deadlines, as FMI 2.0 and 3.0 FMUs: build, check, couple, plot and validate.

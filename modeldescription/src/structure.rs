@@ -4,7 +4,7 @@
 //! variables, ascending. A value reference is unique only within its base type. So the translation looks among
 //! the variables that may stand there ("knowns"), and refuses a value reference that fits more than one.
 
-use crate::validate::variable_path;
+use crate::variable::variable_path;
 use crate::{Causality, Error, Initial, ModelDescription, Variability, Variable};
 use serde::Serialize;
 use std::collections::{BTreeSet, HashMap};

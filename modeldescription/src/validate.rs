@@ -7,11 +7,11 @@
 use crate::calendar::is_utc_instant;
 use crate::names::{forbidden_character, is_one_line};
 use crate::rules::{Check, Place, Unread, Violation, fmi2};
+use crate::variable::variable_path;
 use crate::xml::Header;
 use crate::xsd::Number;
 use crate::{
-    BaseType, EnumerationItem, Error, LogCategory, ModelDescription, Real, ScalarType, Unit, Variable,
-    VariableKind,
+    BaseType, EnumerationItem, Error, LogCategory, ModelDescription, Real, ScalarType, Unit, VariableKind,
 };
 use std::collections::HashMap;
 
@@ -58,11 +58,6 @@ impl ModelDescription {
         variables(self)?;
         self.structure().map(drop)
     }
-}
-
-/// The path of a field of a variable in an error.
-pub(crate) fn variable_path(variable: &Variable, field: &str) -> String {
-    format!("variables[{:?}].{field}", variable.name)
 }
 
 /// The names that paths of places are made of.

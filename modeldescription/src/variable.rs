@@ -380,6 +380,11 @@ impl Variable {
     }
 }
 
+/// The path of a field of a variable in an error.
+pub(crate) fn variable_path(variable: &Variable, field: &str) -> String {
+    format!("variables[{:?}].{field}", variable.name)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,11 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use punctual_cosim::error::Error;
+use punctual_cosim::package;
 use punctual_fmu::configuration::{Configuration, FmiVersion};
 use punctual_modeldescription::SspVersion;
 
-use crate::error::Error;
-use crate::{output, package};
+use crate::output;
 
 /// Arguments of `punctual build`.
 #[derive(Debug, clap::Args)]

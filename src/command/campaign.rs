@@ -5,16 +5,16 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
+use punctual_cosim::campaign::{self, Campaign, Measures, Options, Progress, Rare, Rate, Reader, Summary};
+use punctual_cosim::error::Error;
+use punctual_cosim::whole;
 use punctual_fmu::configuration::Configuration;
+use punctual_pictures::report::campaign::{Pages, pages as campaign_pages};
 use serde::Serialize;
 
 use super::run::stem;
-use crate::campaign::{self, Campaign, Measures, Options, Progress, Rare, Rate, Reader, Summary};
 use crate::codes::INTERRUPTED;
-use crate::error::Error;
 use crate::output::{self, Counter, number};
-use crate::report::campaign::{Pages, pages as campaign_pages};
-use crate::whole;
 
 /// Lines of a list that are printed at once.
 const AT_ONCE: usize = 1000;
@@ -357,7 +357,7 @@ fn list(arguments: &Arguments, campaign: &Campaign, range: Range) -> Result<Exit
         return Ok(ExitCode::SUCCESS);
     }
     let mut head = "run,seed".to_owned();
-    names().for_each(|name| head += &format!(",{}", crate::recording::quoted(name)));
+    names().for_each(|name| head += &format!(",{}", punctual_cosim::recording::quoted(name)));
     output::result(&head);
     let line = |run: u64| {
         let choice = campaign.choice(run);

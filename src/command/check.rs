@@ -5,6 +5,9 @@ use std::process::ExitCode;
 
 use punctual_core::elementary;
 use punctual_core::filter::{BarrierSettings, Filter, Method, Phase, Refusal};
+use punctual_cosim::coupling::Kept;
+use punctual_cosim::error::Error;
+use punctual_cosim::package;
 use punctual_fmu::configuration::{
     Configuration, ControllerConfiguration, FilterConfiguration, PlantConfiguration, SamplingName,
     VariableSection,
@@ -14,10 +17,7 @@ use serde::Serialize;
 use super::closed_loop::{self, LoopReport, RatingReport, ReachReport, Verdict, Wanted};
 use super::map::{self, MapReport, Plane};
 use super::witness::{self, WitnessReport};
-use crate::coupling::Kept;
-use crate::error::Error;
 use crate::output::{self, number};
-use crate::package;
 
 /// Round-off of h at a start on the boundary, in its unit.
 const ROUND_OFF: f64 = 1e-12;

@@ -5,6 +5,8 @@ use std::cell::RefCell;
 
 use punctual_core::dynamics::DynPlant;
 use punctual_core::filter::{Filter, ProfileKind};
+use punctual_cosim::coupling::Kept;
+use punctual_cosim::error::Error;
 use punctual_fmu::configuration::{
     Automatic, FilterConfiguration, Functions, ModelName, PlantSection, ProfileName, UNBOUNDED,
     VariableSection,
@@ -14,8 +16,6 @@ use punctual_reference::nominal::damping;
 use punctual_reference::simulation::Schedule;
 use serde::Serialize;
 
-use crate::coupling::Kept;
-use crate::error::Error;
 use crate::output::{self, number, number_above, number_below};
 
 /// Most samples until a deadline; fewer where the filter's own step is longer.

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use punctual_cosim::error::Error;
+use punctual_study::cases::{self, DEADLINE};
+use punctual_study::demo::{self, Run, Summary};
 use serde::Serialize;
 
-use crate::error::Error;
 use crate::output::{self, Progress, number, quantity};
-use crate::reproduce::cases::{self, DEADLINE};
-use crate::reproduce::demo::{self, Run, Summary};
 
 /// Arguments of `punctual demo`.
 #[derive(Debug, clap::Args)]

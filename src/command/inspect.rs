@@ -7,12 +7,12 @@ use std::borrow::Cow;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use punctual_cosim::error::{Error, FmuProblem};
+use punctual_cosim::host::{Archive, DefaultExperiment, Fmu, Written};
 use punctual_modeldescription::fmi3::Located;
 use roxmltree::Document;
 use serde::Serialize;
 
-use crate::error::{Error, FmuProblem};
-use crate::host::{Archive, DefaultExperiment, Fmu, Written};
 use crate::output;
 
 /// Arguments of `punctual inspect`.

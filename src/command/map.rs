@@ -7,14 +7,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use punctual_core::filter::{Filter, Planning};
 use punctual_core::plan::{Failure, Witness};
+use punctual_cosim::error::Error;
+use punctual_cosim::whole;
 use punctual_fmu::configuration::{FilterConfiguration, Shape};
+use punctual_pictures::plot::{self, Disc, MapPlot, Mark, PathPlot, Series, Style, TimePlot};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::error::Error;
 use crate::output::{Progress, labelled};
-use crate::plot::{self, Disc, MapPlot, Mark, PathPlot, Series, Style, TimePlot};
-use crate::whole;
 
 /// Points of a plan, about.
 const POINTS: f64 = 400.0;

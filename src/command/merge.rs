@@ -4,13 +4,13 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
+use punctual_cosim::error::Error;
+use punctual_cosim::package::merge;
+use punctual_cosim::validate::Severity;
 use serde::Serialize;
 
 use super::validate::seconds;
-use crate::error::Error;
 use crate::output;
-use crate::package::merge;
-use crate::validate::Severity;
 
 /// Arguments of `punctual merge`.
 #[derive(Debug, clap::Args)]

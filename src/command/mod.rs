@@ -20,11 +20,12 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use punctual_cosim::error::Error;
+use punctual_cosim::package;
 use punctual_fmu::configuration::Configuration;
 
 use crate::codes::INTERRUPTED;
-use crate::error::Error;
-use crate::{output, package};
+use crate::output;
 
 /// Reads a configuration file, and prints what the user has to know of it.
 fn read(file: &Path) -> Result<Configuration, Error> {

@@ -5,10 +5,11 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use punctual_cosim::error::Error;
+use punctual_cosim::text;
+
 use super::run::stem;
-use crate::error::Error;
 use crate::output;
-use crate::text;
 
 /// Arguments of `punctual new`.
 #[derive(Debug, clap::Args)]

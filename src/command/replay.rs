@@ -3,14 +3,15 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use punctual_cosim::campaign::{self, Campaign, Choice, GROUP, Measures};
+use punctual_cosim::coupling::{Picture, Promise, System, TimePicture, Variant};
+use punctual_cosim::error::Error;
+use punctual_cosim::recording::Recording;
+use punctual_pictures::drawing::Drawing;
 use serde::Serialize;
 
 use super::run::{promises_text, stem, write_files};
-use crate::campaign::{self, Campaign, Choice, GROUP, Measures};
-use crate::coupling::{Picture, Promise, System, TimePicture, Variant};
-use crate::error::Error;
 use crate::output;
-use crate::recording::Recording;
 
 /// Arguments of `punctual replay`.
 #[derive(Debug, clap::Args)]
@@ -147,12 +148,12 @@ fn values(campaign: &Campaign, choice: &Choice) -> Vec<ValueReport> {
 }
 
 /// The system's pictures. A system without any gets h with its bound for each barrier whose signals are recorded.
-fn pictures(system: &System, measures: &Measures, recording: &Recording) -> Vec<Picture> {
+fn pictures(system: &System, measures: &Measures, recording: &Recording) -> Vec<Drawing> {
     if !system.pictures().is_empty() {
-        return system.pictures().to_vec();
+        return system.pictures().iter().cloned().map(Drawing::from).collect();
     }
     let picture = |barrier: &str| {
-        Picture::Time(TimePicture {
+        Drawing::from(Picture::Time(TimePicture {
             name: Some(barrier.to_owned()),
             title: None,
             signals: vec![format!("{barrier}.h")],
@@ -161,7 +162,7 @@ fn pictures(system: &System, measures: &Measures, recording: &Recording) -> Vec<
             deadline: None,
             bounds: vec![0.0],
             scale: Variant::Linear,
-        })
+        }))
     };
     let is_there = |signal: String| recording.index_of(&signal).is_some();
     let drawn = |barrier: &&str| ["h", "profile"].iter().all(|field| is_there(format!("{barrier}.{field}")));

@@ -5,9 +5,10 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 use std::time::Instant;
 
-use crate::error::Error;
+use punctual_cosim::error::Error;
+use punctual_study::{self as study, Options, Report, bicycles, guide};
+
 use crate::output::{self, Progress};
-use crate::reproduce::{self, Options, Report, bicycles, guide};
 
 /// Arguments of `punctual reproduce`.
 #[derive(Debug, clap::Args)]
@@ -64,9 +65,9 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         }
         return Ok(if kept { ExitCode::SUCCESS } else { ExitCode::from(1) });
     }
-    let report = reproduce::run(options, &tell)?;
+    let report = study::run(options, &tell)?;
     drop(progress);
-    reproduce::save(&report, &arguments.out)?;
+    study::save(&report, &arguments.out)?;
     if arguments.json {
         output::json(&report);
     } else {

@@ -8,24 +8,24 @@ use std::process::ExitCode;
 
 use clap::ValueEnum;
 use punctual_core::filter::Standing;
+use punctual_cosim::coupling::{
+    self, Interference, Kept, Model, Order, Outcome, Own, Promise, Simulation, System,
+};
+use punctual_cosim::error::Error;
+use punctual_cosim::host::journal;
+use punctual_cosim::isolation::{self, Child, End, Voice};
+use punctual_cosim::package;
+use punctual_cosim::recording::{self, Recording};
+use punctual_cosim::text;
+use punctual_cosim::whole;
 use punctual_fmu::configuration::{Configuration, FileKind, FilterConfiguration};
+use punctual_pictures::drawing::{self, Drawing};
+use punctual_pictures::report;
 use serde::Serialize;
 
 use super::check;
 use crate::codes;
-use crate::coupling::{
-    self, Interference, Kept, Model, Order, Outcome, Own, Picture, Promise, Simulation, System,
-};
-use crate::error::Error;
-use crate::host::journal;
-use crate::isolation::{self, Child, End, Voice};
 use crate::output::{self, Progress, number};
-use crate::package;
-use crate::pictures;
-use crate::recording::{self, Recording};
-use crate::report;
-use crate::text;
-use crate::whole;
 
 /// Arguments of `punctual run`.
 #[derive(Debug, clap::Args)]
@@ -272,8 +272,8 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
     let mut files = Vec::new();
     if let Some(folder) = &out {
         let usual = match system.pictures() {
-            [] => pictures::usual(&system, &models, &outcome),
-            asked => asked.to_vec(),
+            [] => drawing::usual(&system, &models, &outcome),
+            asked => asked.iter().cloned().map(Drawing::from).collect(),
         };
         files = write_files(&usual, &stem(path), folder, &outcome.recording, arguments.units)?;
         if arguments.report {
@@ -326,7 +326,7 @@ fn csv_file(path: &Path, folder: &Path) -> PathBuf {
 /// `stem`.
 /// Returns their paths.
 pub(super) fn write_files(
-    pictures: &[Picture],
+    pictures: &[Drawing],
     stem: &str,
     folder: &Path,
     recording: &Recording,
@@ -335,10 +335,10 @@ pub(super) fn write_files(
     let csv = folder.join(format!("{stem}.csv"));
     recording.save_csv(&csv, units)?;
     let mut files = vec![csv];
-    for (i, picture) in pictures.iter().enumerate() {
-        let name = picture.name().map_or_else(|| (i + 1).to_string(), str::to_owned);
+    for (i, drawing) in pictures.iter().enumerate() {
+        let name = drawing.picture.name().map_or_else(|| (i + 1).to_string(), str::to_owned);
         let file = folder.join(format!("{stem}-{name}.svg"));
-        pictures::draw(picture, recording, &file)?;
+        drawing::draw(drawing, recording, &file)?;
         files.push(file);
     }
     Ok(files.iter().map(|file| file.display().to_string()).collect())

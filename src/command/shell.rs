@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap_complete::Shell;
+use punctual_cosim::error::Error;
+use punctual_cosim::whole;
 
-use crate::error::Error;
-use crate::{codes, output, whole};
+use crate::{codes, output};
 
 /// Arguments of `punctual completions`.
 #[derive(Debug, clap::Args)]

@@ -4,11 +4,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
+use punctual_cosim::error::Error;
+use punctual_cosim::validate::{self, Finding, Severity, trial};
 use serde::Serialize;
 
-use crate::error::Error;
 use crate::output;
-use crate::validate::{self, Finding, Severity, trial};
 
 /// Arguments of `punctual validate`.
 #[derive(Debug, clap::Args)]

@@ -4,12 +4,12 @@ use std::path::Path;
 
 use punctual_core::filter::{Filter, Plans};
 use punctual_core::plan::{Failure, Witness};
+use punctual_cosim::error::Error;
 use punctual_fmu::configuration::{FilterConfiguration, UNBOUNDED};
 use serde::Serialize;
 
 use super::closed_loop::LoopReport;
 use super::map;
-use crate::error::Error;
 use crate::output::{self, number, number_above, number_below};
 
 /// The finding on plans from the start.

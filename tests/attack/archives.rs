@@ -3,8 +3,8 @@
 
 use std::io::{Cursor, Write};
 
-use punctual::host::{Fmu, PLATFORM};
-use punctual::validate::{Severity, validate};
+use punctual_cosim::host::{Fmu, PLATFORM};
+use punctual_cosim::validate::{Severity, validate};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 

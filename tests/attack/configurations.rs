@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use punctual::coupling::System;
+use punctual_cosim::coupling::System;
 use punctual_fmu::configuration::Configuration;
 use punctual_fmu::instance::Instance;
 use punctual_fmu::product::Product;

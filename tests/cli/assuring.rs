@@ -1,6 +1,6 @@
 //! `assurance = "on"` from a file: what it needs, what `check` and `run` tell of it, and its columns in a campaign.
 
-use punctual::campaign::Cell;
+use punctual_cosim::campaign::Cell;
 use serde_json::Value;
 
 use crate::campaigns::rows;

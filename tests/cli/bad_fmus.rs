@@ -1,6 +1,6 @@
 //! FMUs that cannot be used: the message names the file and its defect; the code is 1, since the usage was right.
 
-use punctual::host::PLATFORM;
+use punctual_cosim::host::PLATFORM;
 
 use crate::running::system;
 use crate::workshop::{Done, Workshop};

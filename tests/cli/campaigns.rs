@@ -6,7 +6,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use punctual::campaign::{self, Campaign, Cell, Measures, Row};
+use punctual_cosim::campaign::{self, Campaign, Cell, Measures, Row};
 use serde_json::Value;
 
 use crate::html::{body, cells, data};

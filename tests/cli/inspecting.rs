@@ -12,7 +12,7 @@ fn the_text_of_filter_and_plant() {
         let text = workshop.punctual(["inspect", &format!("{name}.fmu")]).success();
         // The test does not depend on the version and the platform.
         let text = text.replace(env!("CARGO_PKG_VERSION"), "VERSION");
-        let text = text.replace(punctual::host::PLATFORM, "PLATFORM");
+        let text = text.replace(punctual_cosim::host::PLATFORM, "PLATFORM");
         assert_golden(&format!("inspect-{name}.txt"), &without_guids(&text));
     }
 }
@@ -23,7 +23,7 @@ fn a_filter_that_is_given_the_derivatives() {
     workshop.punctual(["build", "external.toml", "-o", "external.fmu"]).success();
     let text = workshop.punctual(["inspect", "external.fmu"]).success();
     let text = text.replace(env!("CARGO_PKG_VERSION"), "VERSION");
-    let text = text.replace(punctual::host::PLATFORM, "PLATFORM");
+    let text = text.replace(punctual_cosim::host::PLATFORM, "PLATFORM");
     assert_golden("inspect-external.txt", &without_guids(&text));
 }
 

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::io::{Cursor, Write};
 
-use punctual::host::PLATFORM;
+use punctual_cosim::host::PLATFORM;
 use punctual_modeldescription::Archive;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;

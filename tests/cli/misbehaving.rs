@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Mutex, PoisonError};
 
-use punctual::host::PLATFORM;
+use punctual_cosim::host::PLATFORM;
 use punctual_modeldescription::{Archive, fmi3};
 
 use crate::workshop::Workshop;

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use punctual::host::PLATFORM;
+use punctual_cosim::host::PLATFORM;
 use punctual_fmu::plugin_file_name;
 
 use crate::merging::{elsewhere, entries, for_other_processor, write};

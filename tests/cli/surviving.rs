@@ -1,7 +1,7 @@
 //! `punctual run` with FMUs that misbehave. The message names the component and its deed. The recorded rows are
 //! kept, with `--isolate` even when an FMU ends its process.
 
-use punctual::host::PLATFORM;
+use punctual_cosim::host::PLATFORM;
 
 use crate::misbehaving::{self, description};
 use crate::table::Table;

@@ -508,7 +508,7 @@ fn of_two_platforms(own: &[u8], other: &[u8], defect: &str) -> Workshop {
     archive.add("modelDescription.xml", description(defect, &[])).expect("an entry");
     let suffix = std::env::consts::DLL_SUFFIX;
     archive
-        .add(&format!("binaries/{}/misbehaving{suffix}", punctual::host::PLATFORM), own)
+        .add(&format!("binaries/{}/misbehaving{suffix}", punctual_cosim::host::PLATFORM), own)
         .expect("an entry");
     archive.add(&format!("binaries/{other_platform}"), other).expect("an entry");
     workshop.write("x.fmu", archive.to_bytes().expect("an archive"));
@@ -529,7 +529,7 @@ fn the_trial_runs_where_this_platforms_library_is_whole() {
         let done = workshop.punctual(["validate", "x.fmu"]);
         let wanted = format!(
             "note: not examined: the trial: the library is not complete for {}\n",
-            punctual::host::PLATFORM
+            punctual_cosim::host::PLATFORM
         );
         assert_eq!((done.code, done.stderr), (1, wanted));
     }

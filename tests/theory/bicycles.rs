@@ -1,6 +1,6 @@
 //! Survival of the promise where the plant is another bicycle than the filter's.
 
-use punctual::reproduce::bicycles::{Model, Pairing, Remedy, Size};
+use punctual_study::bicycles::{Model, Pairing, Remedy, Size};
 
 use super::starts::starts;
 

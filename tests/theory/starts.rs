@@ -1,9 +1,9 @@
 //! Random initial conditions: the 100 of the documentation's tables and others.
 
-use punctual::reproduce::starts::{self, hundred};
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{BarrierSettings, Method};
 use punctual_core::plants::{PointMass, Unicycle};
+use punctual_study::starts::{self, hundred};
 
 use super::{Nominal, Run, bicycle, coast, damp_speed, damp_velocity, distance, quadratic, run};
 

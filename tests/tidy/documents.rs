@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use punctual::codes::{CODES, FOUND_BY};
-use punctual::coupling::System;
+use punctual_cosim::coupling::System;
 use punctual_fmu::configuration::Configuration;
 use punctual_fmu::product::Product;
 use punctual_modeldescription::Causality;

@@ -57,7 +57,7 @@ pub(crate) static SOURCES: LazyLock<Vec<Source>> = LazyLock::new(|| {
     rust.map(|text| Source { path: text.path.clone(), lexed: lex(&text.text) }).collect()
 });
 
-/// The Rust files of the seven crates themselves.
+/// The Rust files of the crates themselves.
 pub(crate) fn crates() -> impl Iterator<Item = &'static Source> {
     let folders = [
         "src/",
@@ -66,6 +66,9 @@ pub(crate) fn crates() -> impl Iterator<Item = &'static Source> {
         "modeldescription/src/",
         "models/src/",
         "fmu/src/",
+        "cosim/src/",
+        "pictures/src/",
+        "study/src/",
         "python/src/",
     ];
     SOURCES.iter().filter(move |source| folders.iter().any(|folder| source.path.starts_with(folder)))

@@ -1,10 +1,10 @@
 //! The report on an FMU of FMI 2.0.
 
+use punctual_cosim::host::{Fmi2Description as Description, Fmu, Output};
 use punctual_modeldescription::{ModelExchange, Unknown, Variable};
 use serde::Serialize;
 
 use super::{DependencyReport, Facts, Report, VariableReport, experiment, flags, given};
-use crate::host::{Fmi2Description as Description, Fmu, Output};
 
 #[derive(Serialize)]
 pub(super) struct Capabilities {

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::fmt;
 
+use punctual_cosim::host::Archive;
 use punctual_modeldescription::fmi3::{
     self, Located, LocatedTerminals, ModelDescription, TERMINALS, Terminals, Variable,
 };
@@ -11,7 +12,6 @@ use roxmltree::Document;
 use serde::Serialize;
 
 use super::{DependencyReport, Facts, Report, VariableReport, experiment, flags, given};
-use crate::host::Archive;
 
 /// An interface and its capabilities, by the names in the file.
 #[derive(Serialize)]

@@ -1,8 +1,8 @@
 //! Bicycles whose angle is a state that the filter commands the rate of (docs/bicycle.md, the plant's own model), with
 //! a witness.
 
-use punctual::reproduce::bicycles::Size;
 use punctual_core::filter::Standing;
+use punctual_study::bicycles::Size;
 
 use super::cases;
 use crate::judge::case::{Case, Reference, Set};

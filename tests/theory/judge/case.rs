@@ -1,7 +1,7 @@
 //! One closed loop: plant, sets, bounds, reference input, samples; all that is needed to run it again.
 
-use punctual::reproduce::starts;
 use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Sampling};
+use punctual_study::starts;
 
 use super::model::{Input, Plant, Shape, State};
 

@@ -1,0 +1,261 @@
+//! Pictures of series as SVG files: paths in a plane and signals over time. Needs no system font
+//! and knows no FMU. Everything here takes plain numbers; labels carry the units.
+
+mod axes;
+mod canvas;
+mod chart;
+mod decimate;
+mod legend;
+mod map;
+mod path;
+mod scale;
+mod time;
+
+use std::path::Path as File;
+
+use punctual_cosim::error::Error;
+use serde::Serialize;
+
+use crate::outlines::Outline;
+use canvas::Canvas;
+pub use chart::{Chart, Curve, Scaling, seven_digits};
+pub use decimate::decimate;
+pub use scale::extent;
+
+/// Colours told apart by colour-blind readers too (Okabe and Ito 2008, without the yellow that
+/// vanishes on white), for series in this order.
+pub const PALETTE: [[u8; 3]; 7] = [
+    [0, 114, 178],   // blue
+    [213, 94, 0],    // vermillion
+    [0, 158, 115],   // green
+    [204, 121, 167], // purple
+    [230, 159, 0],   // orange
+    [86, 180, 233],  // sky
+    [60, 60, 60],    // grey
+];
+
+/// Name of a picture that has its file for itself.
+const ALONE: &str = "plot";
+
+/// Points of a series that are drawn, about; more are thinned out without losing extremes.
+pub const POINTS: usize = 2000;
+
+/// Paths in a plane, with equal axes.
+#[derive(Clone, Debug, Default)]
+pub struct PathPlot {
+    /// Title; empty for none.
+    pub title: String,
+    /// Label of the x axis, with its unit.
+    pub x_label: String,
+    /// Label of the y axis, with its unit.
+    pub y_label: String,
+    /// The paths, each in the palette's next colour.
+    pub paths: Vec<Path>,
+    /// Discs beneath the paths.
+    pub discs: Vec<Disc>,
+    /// Other sets beneath the paths.
+    pub outlines: Vec<Outline>,
+}
+
+/// A path: a start marker, a line, and a marker where it arrives.
+#[derive(Clone, Debug, Default)]
+pub struct Path {
+    /// Legend entry; empty for none.
+    pub label: String,
+    /// Points along x, in the unit of the axis; what is not finite breaks the line.
+    pub x: Vec<f64>,
+    /// Points along y, as many as in `x`.
+    pub y: Vec<f64>,
+    /// The point that gets the arrival marker.
+    pub arrival: Option<usize>,
+    /// Style of the line.
+    pub style: Style,
+}
+
+/// A disc.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Disc {
+    /// Legend entry; empty for none.
+    pub label: String,
+    /// Its centre, in the units of the axes, finite.
+    pub centre: [f64; 2],
+    /// Its radius, in the units of the axes, finite, > 0.
+    pub radius: f64,
+    /// Whether its outside is the safe set.
+    pub obstacle: bool,
+}
+
+/// The colour of a set that is to be kept out of, or to be in.
+fn set_colour(obstacle: bool) -> [u8; 3] {
+    if obstacle { colour(1) } else { canvas::SAFE }
+}
+
+/// Cells of a plane in the colours of what was found there.
+#[derive(Clone, Debug, Default)]
+pub struct MapPlot {
+    /// Title; empty for none.
+    pub title: String,
+    /// Label of the x axis, with its unit.
+    pub x_label: String,
+    /// Label of the y axis, with its unit.
+    pub y_label: String,
+    /// From and to along x, in the unit of the axis, finite.
+    pub x: [f64; 2],
+    /// From and to along y.
+    pub y: [f64; 2],
+    /// Number of cells along x.
+    pub columns: usize,
+    /// The kind of each cell, row after row from below: a position in `kinds`.
+    pub cells: Vec<usize>,
+    /// What the kinds mean. The first has the colour of safe sets.
+    pub kinds: Vec<String>,
+    /// Whether a unit has the same length on both axes; discs need it.
+    pub equal: bool,
+    /// Discs over the cells.
+    pub discs: Vec<Disc>,
+}
+
+/// Signals over time.
+#[derive(Clone, Debug, Default)]
+pub struct TimePlot {
+    /// Title; empty for none.
+    pub title: String,
+    /// Label of the y axis, with its unit. Time is in seconds.
+    pub y_label: String,
+    /// The signals.
+    pub series: Vec<Series>,
+    /// Vertical lines, such as a deadline.
+    pub instants: Vec<Mark>,
+    /// Horizontal lines, such as input bounds.
+    pub bounds: Vec<Mark>,
+    /// Shaded regions.
+    pub regions: Vec<Region>,
+    /// The y axis.
+    pub scale: Scale,
+}
+
+/// A signal.
+#[derive(Clone, Debug, Default)]
+pub struct Series {
+    /// Legend entry; empty for none.
+    pub label: String,
+    /// Times in seconds, rising.
+    pub time: Vec<f64>,
+    /// Values in the unit of the axis, as many as times; what is not finite breaks the line.
+    pub values: Vec<f64>,
+    /// Style of the line.
+    pub style: Style,
+    /// Position in [`PALETTE`]; default the number of the series. Give a reference and the signal that follows it
+    /// the same.
+    pub colour: Option<usize>,
+}
+
+/// Styles of a line. Points without one are for charts only.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Style {
+    /// Without gaps.
+    #[default]
+    Solid,
+    /// In dashes: references, profiles.
+    Dashed,
+    /// Held from point to point: sampled inputs. In a path the same as solid.
+    Steps,
+    /// No line: a dot at each point.
+    Points,
+    /// No line: a cross at each point.
+    Crosses,
+}
+
+/// A straight line across the picture.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Mark {
+    /// The text beside it; empty for none.
+    pub label: String,
+    /// Position: seconds for an instant, the unit of the axis for a bound. Finite.
+    pub at: f64,
+}
+
+/// A shaded rectangle, which may be unbounded.
+#[derive(Clone, Debug)]
+pub struct Region {
+    /// Legend entry; empty for none.
+    pub label: String,
+    /// From and to, in seconds; infinite for the whole picture.
+    pub time: [f64; 2],
+    /// From and to, in the unit of the y axis; infinite for the whole picture.
+    pub values: [f64; 2],
+}
+
+/// The y axis of a [`TimePlot`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Scale {
+    /// Linear, over all values.
+    #[default]
+    Linear,
+    /// Linear, between these two percentiles (0 to 100) of all values; the picture says so and tells the
+    /// extremes.
+    Percentiles(f64, f64),
+    /// Linear, between these two values; the picture says so where values lie beyond.
+    Fixed(f64, f64),
+    /// The logarithm of absolute values; zeros break the line.
+    Logarithmic,
+}
+
+/// Draws a [`PathPlot`] into the SVG file `file`.
+///
+/// # Errors
+///
+/// Nothing finite to draw, or the file cannot be written.
+pub fn path(plot: &PathPlot, file: &File) -> Result<(), Error> {
+    let mut canvas = Canvas::new(ALONE, path::WIDTH, path::HEIGHT);
+    path::draw(plot, &mut canvas).map_err(|message| Error::plot(file, message))?;
+    canvas.save(file)
+}
+
+/// Draws a [`MapPlot`] into the SVG file `file`.
+///
+/// # Errors
+///
+/// No cell, or the file cannot be written.
+pub fn map(plot: &MapPlot, file: &File) -> Result<(), Error> {
+    let mut canvas = Canvas::new(ALONE, map::WIDTH, map::HEIGHT);
+    map::draw(plot, &mut canvas).map_err(|message| Error::plot(file, message))?;
+    canvas.save(file)
+}
+
+/// Draws a [`TimePlot`] into the SVG file `file`.
+///
+/// # Errors
+///
+/// Nothing finite to draw, or the file cannot be written.
+pub fn time(plot: &TimePlot, file: &File) -> Result<(), Error> {
+    times(std::slice::from_ref(plot), file)
+}
+
+/// Draws several [`TimePlot`]s over one time axis, one below the other, into the SVG file `file`.
+///
+/// # Errors
+///
+/// As for [`time`].
+pub fn times(plots: &[TimePlot], file: &File) -> Result<(), Error> {
+    let mut canvas = Canvas::new(ALONE, time::WIDTH, time::height(plots));
+    time::draw(plots, &mut canvas).map_err(|message| Error::plot(file, message))?;
+    canvas.save(file)
+}
+
+/// Draws a [`Chart`] as an SVG document. `name` (letters, digits, `-` and `_`) begins its ids, so that several can
+/// stand in one page, and names it in messages.
+///
+/// # Errors
+///
+/// Nothing finite to draw.
+pub fn chart(chart: &Chart, name: &str) -> Result<String, Error> {
+    let mut canvas = Canvas::new(name, chart::WIDTH, chart.height());
+    chart::draw(chart, &mut canvas).map_err(|message| Error::plot(File::new(name), message))?;
+    Ok(canvas.document())
+}
+
+fn colour(index: usize) -> [u8; 3] {
+    PALETTE[index % PALETTE.len()]
+}
