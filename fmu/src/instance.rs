@@ -519,7 +519,7 @@ impl Instance {
         self.mistimed = Mistimed::Told;
         format!(
             "currentCommunicationPoint is {given}, must be the restored one, {restored}: the step is made from there, \
-             as every such step after a restore (told once)"
+             as every such step after a restore (reported once)"
         )
     }
 

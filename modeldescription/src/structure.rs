@@ -162,8 +162,8 @@ impl<'a> Knowns<'a> {
                 Some(positions) => {
                     let names: Vec<_> =
                         positions.iter().map(|p| format!("{:?}", self.variables[*p].name)).collect();
-                    let value = format!("{value_reference}, which stands for {}", names.join(" and "));
-                    return Err(Error::invalid(path, value, "value references that stand for one variable"));
+                    let value = format!("{value_reference}, which is that of {}", names.join(" and "));
+                    return Err(Error::invalid(path, value, "value references of exactly one variable"));
                 }
                 None => return Err(Error::invalid(path, value_reference, allowed)),
             }

@@ -29,7 +29,7 @@ class Status(IntEnum):
 
 
 class Assurance(IntEnum):
-    """Where the promise of a filter that follows plans stands."""
+    """Status of the guarantee of a filter that follows plans."""
 
     UNDECIDED = 0
     """No step with a valid state yet, or not armed."""
@@ -46,7 +46,7 @@ class Assurance(IntEnum):
 
 
 class Phase(IntEnum):
-    """Where a barrier stands with its promise."""
+    """Phase of a barrier's promise."""
 
     WAITING = 0
     """Not begun: no step with valid inputs yet, or not armed."""

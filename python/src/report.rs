@@ -30,7 +30,7 @@ pub(crate) struct BarrierReport {
     /// h now, in its own unit; not a number where the state is not.
     #[pyo3(get)]
     h: f64,
-    /// The lower bound on h that is promised now, in the unit of h.
+    /// The lower bound on h promised now, in the unit of h.
     #[pyo3(get)]
     profile: f64,
     /// Time to the deadline in s, 0 from the deadline on.
@@ -42,7 +42,7 @@ pub(crate) struct BarrierReport {
     /// Whether h >= 0 has been reached since the deadline began to count.
     #[pyo3(get)]
     arrived: bool,
-    /// Whether a plan in hand keeps the promise whatever u_ref is; where the filter follows plans.
+    /// Whether a backup plan keeps the promise, whatever u_ref is; only if the filter follows plans.
     #[pyo3(get)]
     guaranteed: bool,
     /// Whether the theorem behind the present phase applies so far.

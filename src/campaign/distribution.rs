@@ -48,7 +48,7 @@ impl DistributionName {
             Self::LogUniform => ("log_uniform", &["min", "max"], &[]),
             Self::Normal => ("normal", &["mean", "deviation"], &["min", "max"]),
             Self::Choice => ("choice", &["values"], &[]),
-            Self::Course => ("course", &["values", "period"], &[]),
+            Self::Course => ("sequence", &["values", "period"], &[]),
             Self::Seed => ("seed", &[], &[]),
         }
     }
@@ -215,7 +215,7 @@ impl fmt::Display for Distribution {
             }
             Self::Course { values, period } => {
                 let count = values.len();
-                write!(f, "a course of {count} values, each for {period} s, from {:?} on", values[0])
+                write!(f, "a sequence of {count} values, each for {period} s, from {:?} on", values[0])
             }
             Self::Seed => f.write_str("the seed of the run"),
         }

@@ -240,7 +240,7 @@ impl Campaign {
                 "was packed by version {version} of this program, this is version {ours}"
             )));
         }
-        let changed = || wrong("was changed after `--pack` wrote it; pack the campaign anew".to_owned());
+        let changed = || wrong("was changed after `--pack` wrote it; pack the campaign again".to_owned());
         if fingerprint != source.fingerprint() {
             return Err(changed());
         }
@@ -348,7 +348,7 @@ impl Campaign {
                     |key, message| Err(in_file(ConfigurationError::new(format!("{field}.{key}"), message)));
                 if !varied.tunable {
                     let message =
-                        "is \"course\", which is for what may change in a run: inputs and tunable parameters";
+                        "is \"sequence\", which is for what may change in a run: inputs and tunable parameters";
                     return wrong("distribution", message.to_owned());
                 }
                 let step = system.experiment().step;
@@ -488,7 +488,7 @@ impl Campaign {
             let alone = match (&varied.distribution, self.piece()?) {
                 (Distribution::Course { .. }, _) => continue,
                 (Distribution::Seed, Some(steps)) => serde_json::json!({
-                    "distribution": "course",
+                    "distribution": "sequence",
                     "values": choice.pieces,
                     "period": steps as f64 * self.system.experiment().step,
                 }),

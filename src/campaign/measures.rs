@@ -255,7 +255,7 @@ fn columns(campaign: &Campaign, filters: &[FilterPlan]) -> Vec<Column> {
         }
         for standing in Standing::ALL.into_iter().filter(|_| filter.assured) {
             let name = standing.name();
-            let meaning = format!("communication points at which the promise was {name}");
+            let meaning = format!("communication points at which the guarantee was {name}");
             add(format!("{}.assurance.{name}", filter.component), Kind::Count, "", &meaning);
         }
         for (input, unit) in &filter.inputs {

@@ -86,7 +86,7 @@ pub(super) fn starts(
     };
     let mut kinds = vec!["can be promised".to_owned()];
     kinds.extend(c.barrier.iter().map(|barrier| format!("no plan keeps {}", barrier.name)));
-    kinds.extend(["no plan comes to rest", "nothing to promise"].map(str::to_owned));
+    kinds.extend(["no plan reaches an equilibrium", "nothing to promise"].map(str::to_owned));
     let others = c.barrier.len() + 1;
     let kind = |filter: &AssuredFilter, x: &[f64]| {
         // Outside of a set without a deadline nothing can be promised of it.

@@ -124,7 +124,7 @@ pub fn unit_notes(system: &System, descriptions: &[&Description], links: &[Link]
                 format!("{from} ({given}) → {to} ({taken})"),
             ),
             Units::Overruled(by) => (
-                "a factor of the file stands, though the units make another one",
+                "the factor of the file is used, although the units give another one",
                 String::new(),
                 format!("{from} ({given}) → {to} ({taken}) has {}, not {}", brief(link.factor), brief(by)),
             ),

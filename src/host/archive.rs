@@ -315,7 +315,7 @@ fn compression(method: CompressionMethod) -> String {
         (CompressionMethod::XZ, "xz"),
     ];
     let known = NAMES.iter().find(|(known, _)| *known == method);
-    known.map_or_else(|| format!("a method of its own, {method:?}"), |(_, name)| (*name).to_owned())
+    known.map_or_else(|| format!("an unknown method, {method:?}"), |(_, name)| (*name).to_owned())
 }
 
 /// Writes one entry below `folder`, and no more bytes than the archive announced for it.

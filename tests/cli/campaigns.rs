@@ -948,7 +948,7 @@ fn a_rare_failure_is_estimated_and_shown() {
         "distribution = \"normal\"\nmean = 0\ndeviation = 1",
         "distribution = \"choice\"\nvalues = [0.0, 0.1]",
     );
-    refused(narrow, "--rare: found no way to a failure: the least h that ");
+    refused(narrow, "--rare: found no path to a failure: the least h that ");
 }
 
 /// Runs that end before a deadline keep no promise: the reason is said, whatever is asked.
@@ -1162,9 +1162,9 @@ fn a_course_is_the_same_in_every_run() {
     refused(course.replace("1.0\n", "0.0\n"), "u.u\".period: is 0, must be finite and >= 1e-9");
     refused(
         course.replace("values = [1.0, -3.0]\n", ""),
-        "u.u\".values: missing; distribution = \"course\" needs values, period",
+        "u.u\".values: missing; distribution = \"sequence\" needs values, period",
     );
     let fixed = course.replace("plant.u.u", "plant.x0.x")
         + "[vary.\"plant.u.u\"]\ndistribution = \"choice\"\nvalues = [0.0]\n";
-    refused(fixed, "x0.x\".distribution: is \"course\", which is for what may change in a run");
+    refused(fixed, "x0.x\".distribution: is \"sequence\", which is for what may change in a run");
 }

@@ -93,7 +93,7 @@ impl FixedTime {
     /// A method other than [`Method::ReferenceProfile`](super::Method::ReferenceProfile).
     pub fn with_profile(self, profile: impl Profile + Send + Sync + 'static) -> Result<Self, Error> {
         let Approach::Profile(reference) = self.approach else {
-            let message = "a profile of one's own belongs to the reference profile";
+            let message = "a custom profile requires the reference profile";
             return Err(Error::new(ErrorKind::Unsupported, "method", message));
         };
         Ok(Self { approach: Approach::Profile(reference.along(Arc::new(profile))), ..self })
@@ -116,9 +116,9 @@ impl FixedTime {
             Approach::Root(_) | Approach::First(_) => false,
         };
         let message = if !is_plain {
-            Some(("method", "a constraint of one's own takes the place of method and profile"))
+            Some(("method", "a custom constraint replaces method and profile"))
         } else if settings.recovery.is_some() {
-            Some(("recovery", "a constraint of one's own knows no recovery"))
+            Some(("recovery", "a custom constraint has no recovery"))
         } else {
             None
         };

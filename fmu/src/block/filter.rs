@@ -90,7 +90,7 @@ impl FilterBlock {
         self.after_barriers() + of_plans + usize::from(self.configuration.ends_plans())
     }
 
-    /// Writes where the promise stands, why u_ref was changed, and at `t` until when the promise stands.
+    /// Writes status of the guarantee, why u_ref was changed, and at `t` until when the promise stands.
     fn write_standing(&self, standing: Standing, t: f64, values: &mut Values) {
         let at = self.after_barriers();
         values.integers[at] = standing as i32;
@@ -222,7 +222,7 @@ impl Block for FilterBlock {
             return None;
         }
         if standing == Standing::Assured && before.is_some_and(|before| !stands(before)) {
-            return Some("the promise is assured again: a plan keeps it from here".to_owned());
+            return Some("the guarantee is regained: a plan keeps the promise from here".to_owned());
         }
         (!stands(standing)).then(|| {
             let why = match failure {
@@ -231,7 +231,7 @@ impl Block for FilterBlock {
                 None => self.configuration.unaccounted(),
             };
             let why = why.map(|why| format!(": {why}")).unwrap_or_default();
-            format!("the promise is {} ({}){why}", standing.name(), standing.meaning())
+            format!("the guarantee is {} ({}){why}", standing.name(), standing.meaning())
         })
     }
 

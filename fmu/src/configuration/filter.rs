@@ -233,26 +233,26 @@ pub(super) static SECTION: Section = Section {
                 Word(AssuranceName::WORDS),
                 Some("`auto`"),
                 "`on`: the filter promises only what a plan within the bounds keeps, whatever u_ref is, and follows it where it \
-                 must ([guarantees](guarantees.md#will-it-always)). The plan is sought at the first step; none found: no \
-                 promise. Needs a model to run ahead, sets that stay where they are, no delay, no errors. `off`: the rows \
+                 must ([guarantees](guarantees.md#will-it-always)). The plan is sought at the first step; if none is found,\
+                 nothing is promised. Needs a model to run ahead, sets that stay where they are, no delay, no errors. `off`: the rows \
                  alone. `auto`: `on` where that is possible and every input has bounds, else `off`. Where every input has bounds, a \
                  warning names the keys that switch it off for all barriers",
             ),
             Key::new(
                 "plan_horizon",
                 Number(Is("s"), Range::POSITIVE),
-                Some("none: every plan ends at rest"),
-                "where no plan ends at rest, such as of an aeroplane or in a set that moves for ever: how far one has to reach \
-                 past the last deadline and the present, to be promised until its end, `assured_until`. It is prolonged before \
-                 it ends, if a plan is found",
+                Some("none: every plan ends at an equilibrium"),
+                "if no plan ends at an equilibrium, as for an aeroplane or a set that moves for ever: how far a plan has to reach\
+                 past the last deadline and the present. The promise holds until its end, `assured_until`. It is extended before it ends, if a\
+                 longer plan is found",
             ),
             Key::new(
                 "search_budget",
                 Count(1, MOST_PROGRAMS),
                 Some("3 where plans are followed"),
-                "the most quadratic programs of a search for a plan at one step after the first; it goes on at the next step, while \
-                 the plan at hand drives. More find a way for u_ref, or a lost plan again, in fewer steps, each of which may \
-                 take longer: about 0.3 ms each for a vehicle, the time growing with states, inputs and barriers",
+                "the most quadratic programs that a search for a plan solves at one step after the first; it continues at the next\
+                 step, and meanwhile the current plan drives. With more, a plan for u_ref, or one in place of a lost plan, is found in fewer steps,\
+                 each of which may take longer: about 0.3 ms per program for a vehicle, and more with more states, inputs and barriers",
             ),
             Key::new(
                 "actuation_delay",
@@ -265,15 +265,15 @@ pub(super) static SECTION: Section = Section {
                 "period_max",
                 Number(Is("s"), Range::NON_NEGATIVE),
                 Some("0"),
-                "the longest time between two steps; the rows then hold for steps of any length up to it, and a plan \
-                 seldom ends at one. 0: as long as the ones before were",
+                "the longest time between two steps; the rows then hold for steps of any length up to it, and a late\
+                 step seldom ends a plan. 0: as long as the previous ones",
             ),
             Key::new(
                 "arm_after",
                 Number(Is("s"), Range::NON_NEGATIVE),
                 Some("0: at the first step"),
                 "the time from the first step until the filter is [armed](fmu.md#arming): every deadline counts from the first \
-                 step with valid inputs then. Before, nothing is asked or promised, and u is u_ref within its bounds",
+                 step with valid inputs then. Until then nothing is required or promised, and u is u_ref within its bounds",
             ),
             Key::new(
                 "measurement_errors",
@@ -292,8 +292,8 @@ pub(super) static SECTION: Section = Section {
                 "policy",
                 TextByName,
                 Some("none"),
-                "for each input of the model the [expression](#expressions) of a controller that may keep the promises, of \
-                 states, parameters and `t`: a search for a plan begins with it too. Nothing rests on it",
+                "for each input of the model the [expression](#expressions) of a controller that may keep the promises, in\
+                 states, parameters and `t`: a search for a plan starts from it too. No guarantee depends on it",
             ),
             Key::new(
                 "direct_feedthrough",
@@ -741,7 +741,7 @@ impl FilterConfiguration {
                 let name = section.map_or("a barrier", |section| &section.name);
                 let unit = section.map(|section| section.unit(&self.plant)).unwrap_or_default();
                 format!(
-                    "the plant is not where the model led; as far off again, {name} would not be met at {time:.6} s, by {:.6} \
+                    "the plant is not where the model predicted; with the same deviation again, {name} would not be met at {time:.6} s, by {:.6} \
                      {unit}",
                     -slack
                 )
@@ -751,12 +751,12 @@ impl FilterConfiguration {
                 format!("{name} came due while no plan was followed")
             }
             Failure::NoRest if self.plan_horizon.is_none() => {
-                "the plant does not come to rest, or a set moves; with `plan_horizon` a plan may end before"
+                "the plant does not reach an equilibrium, or a set moves; with `plan_horizon` a plan may end in motion"
                     .to_owned()
             }
             Failure::NoRest => "no plan reaches as far as plan_horizon".to_owned(),
-            Failure::Unsteady => "the plant is so unstable on the way that a deviation too small to measure grows until the plan \
-                                  is lost; wider bounds or a start farther from where they end would hold it"
+            Failure::Unsteady => "the plant is so unstable along the plan that a deviation too small to measure grows until the\
+                                  plan is lost; with wider bounds, or from a start farther from where they no longer suffice, it could be held"
                 .to_owned(),
             Failure::Apart { barriers, contained } => {
                 let apart = self.apart_in_words(barriers).unwrap_or_default();
@@ -768,7 +768,7 @@ impl FilterConfiguration {
                     false => format!("{apart}, and both are to be kept at the same time"),
                 }
             }
-            Failure::Nothing => "there is nothing from there that could be promised".to_owned(),
+            Failure::Nothing => "nothing can be promised from there".to_owned(),
             Failure::TooLong => {
                 "there are too many samples until the deadline, or too long a step".to_owned()
             }

@@ -171,7 +171,7 @@ pub(super) static PLANT: Section = Section {
                 "plugin_digest",
                 TextOrByName,
                 Some("any"),
-                "what its bytes must come to: a text, or one for each platform",
+                "the expected digest of its bytes: a text, or one for each platform",
             ),
         ];
         KEYS.iter().collect()
@@ -194,8 +194,8 @@ pub(super) static VARIABLE: Section = Section {
                 "min",
                 Number(Of("in its unit"), Range::FINITE),
                 Some("none"),
-                "of a state: where the model is meant, and the relative degree looked for; of an input: its bound where \
-                 `[bounds]` says nothing",
+                "of a state: the range for which the model is meant, and in which the relative degree is determined; of\
+                 an input: its bound if `[bounds]` gives none",
             ),
             Key::new("max", Number(Of("in its unit"), Range::FINITE), Some("none"), "the same from above"),
         ];

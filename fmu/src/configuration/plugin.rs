@@ -278,7 +278,7 @@ fn merged_parameters(
             return Err(ConfigurationError::new(format!("{path}.name"), message));
         };
         if own[..i].iter().any(|other| other.name == given.name) {
-            let message = format!("is {:?}, which stands there twice", given.name);
+            let message = format!("is {:?}, which is given twice", given.name);
             return Err(ConfigurationError::new(format!("{path}.name"), message));
         }
         if given.unit != "1" {

@@ -57,7 +57,7 @@ words! {
         #[default]
         Report = "report",
         /// [`Infeasible::Soonest`].
-        Soonest = "soonest",
+        Soonest = "earliest",
     }
 }
 
