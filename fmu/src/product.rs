@@ -395,7 +395,8 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
         table.add("reason".into(), reason, output, number);
     }
     if c.ends_plans() {
-        let until = "time until which the guarantee holds, 1e30 for ever; the current time if nothing is assured";
+        let until =
+            "time until which the guarantee holds, 1e30 for ever; the current time if nothing is assured";
         table.add("assured_until".into(), until, output, real(None, "s"));
     }
     if let Some(integrator) = &c.integrator {

@@ -347,8 +347,7 @@ impl Campaign {
                 let wrong =
                     |key, message| Err(in_file(ConfigurationError::new(format!("{field}.{key}"), message)));
                 if !varied.tunable {
-                    let message =
-                        "is \"sequence\", which is for what may change in a run: inputs and tunable parameters";
+                    let message = "is \"sequence\", which is for what may change in a run: inputs and tunable parameters";
                     return wrong("distribution", message.to_owned());
                 }
                 let step = system.experiment().step;

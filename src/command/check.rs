@@ -374,7 +374,8 @@ fn filter(
     let damped =
         simulated.filter(|_| failed && matches!(wanted, Wanted::None) && closed_loop::has_damping(c));
     let with_damping = damped.map(|x0| closed_loop::watch(c, x0, &Wanted::Damping)).transpose()?;
-    let backup_plan = simulated.map(|x0| witness::find(c, x0, closed_loop.as_ref(), out)).transpose()?.flatten();
+    let backup_plan =
+        simulated.map(|x0| witness::find(c, x0, closed_loop.as_ref(), out)).transpose()?.flatten();
     let (step, experiment) = (c.experiment.step_size, c.experiment);
     let mut warnings = Configuration::Filter(c.clone()).in_degrees();
     let runs_for = experiment.stop_time - experiment.start_time;
@@ -696,9 +697,7 @@ fn filter_text(report: &FilterReport) -> String {
             start.iter().map(|(name, value)| format!("{name} = {}", number(*value))).collect();
         lines.push(format!("start: {}", state.join(", ")));
     } else {
-        lines.push(
-            "start: none; give `x0` in the file or --x0 to examine closed loop and plans".to_owned(),
-        );
+        lines.push("start: none; give `x0` in the file or --x0 to examine closed loop and plans".to_owned());
     }
     if let Some(status) = &report.status {
         lines.push(format!("first step with u_ref = 0: {status}"));

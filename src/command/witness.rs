@@ -1,4 +1,4 @@
-//! The witness of `check`: whether found; within the bounds, it keeps every promise, whatever u_ref is.
+//! The backup plan of `check`: whether one within the bounds keeps every promise, whatever u_ref is.
 
 use std::path::Path;
 
@@ -88,7 +88,10 @@ pub(super) fn find(
     let t = c.experiment.start_time;
     let unit = |i: usize| c.barrier[i].unit(&c.plant);
     let plan = |witness: &Witness| PlanReport {
-        at_equilibrium_from: witness.until.is_infinite().then(|| witness.inputs.last().map_or(t, |(end, _)| *end)),
+        at_equilibrium_from: witness
+            .until
+            .is_infinite()
+            .then(|| witness.inputs.last().map_or(t, |(end, _)| *end)),
         until: Some(witness.until).filter(|until| until.is_finite()),
         inputs: inputs
             .iter()

@@ -218,7 +218,11 @@ fn what_is_not_promised_is_said_in_words() {
     sample(&slave, [-300.0, 0.0, 0.0, 0.0]);
     slave.step(3.0 * STEP, STEP);
     assert_eq!(slave.integer("assurance"), Standing::Withdrawn as i32);
-    assert!(slave.log.messages()[0].starts_with("the guarantee is withdrawn ("), "{:?}", slave.log.messages());
+    assert!(
+        slave.log.messages()[0].starts_with("the guarantee is withdrawn ("),
+        "{:?}",
+        slave.log.messages()
+    );
     // Back again, it is given again, which is said once too.
     for k in 4..6 {
         sample(&slave, [0.0, 0.0, 1.0, 0.0]);

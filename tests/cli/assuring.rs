@@ -54,7 +54,10 @@ fn a_promise_is_kept_whatever_is_wanted() {
             (&true.into(), &true.into())
         );
     }
-    assert_eq!((&report["backup_plan"]["found"], &report["closed_loop"]["kept"]), (&true.into(), &true.into()));
+    assert_eq!(
+        (&report["backup_plan"]["found"], &report["closed_loop"]["kept"]),
+        (&true.into(), &true.into())
+    );
     let text = workshop.punctual(&check[..4]).success();
     assert!(text.contains("; guaranteed, whatever u_ref is\n"), "{text}");
     let run =

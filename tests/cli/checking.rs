@@ -362,7 +362,8 @@ fn a_barrier_that_begins_later_or_ends_is_judged() {
         let report: Value = serde_json::from_str(&done.stdout).expect("JSON");
         let barrier = &report["barriers"][0];
         assert_eq!(barrier["deadline"].as_f64(), Some(deadline));
-        let lists = [&barrier["start"]["reach"]["earliest_at_most"], &report["backup_plan"]["earliest"][0][1]];
+        let lists =
+            [&barrier["start"]["reach"]["earliest_at_most"], &report["backup_plan"]["earliest"][0][1]];
         for soonest in lists.iter().filter_map(|value| value.as_f64()) {
             let range = begin.unwrap_or(0.0)..=end.unwrap_or(f64::INFINITY);
             assert!(range.contains(&soonest), "{window}: {soonest}");

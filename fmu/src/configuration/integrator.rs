@@ -219,7 +219,10 @@ impl FilterConfiguration {
         let mut found = Vec::new();
         let follows = self.barrier_inputs();
         if let Some(input) = follows.first() {
-            found.push(format!("a barrier follows {}, which is moved from outside, so that no plan can predict it", input.name));
+            found.push(format!(
+                "a barrier follows {}, which is moved from outside, so that no plan can predict it",
+                input.name
+            ));
         }
         for error in AssuredFilter::obstacles(filter, self.pace()) {
             let (field, message) = (error.field(), error.message());

@@ -71,7 +71,9 @@ static KEYS: [Row; 33] = [
             meaning: "after the first step: to be inside from then on. Without one the barrier is to be kept from a start \
                       inside it; one outside is promised nothing, and `check` and `run` say so",
         },
-        parameters: &[whole("time from the first step by which h >= 0, and stays so", |b| b.deadline.as_mut())],
+        parameters: &[whole("time from the first step by which h >= 0, and stays so", |b| {
+            b.deadline.as_mut()
+        })],
     },
     plain(
         "method",
@@ -97,9 +99,12 @@ static KEYS: [Row; 33] = [
             whole("decay rate of an error against the profile; 0: 20 / deadline, at most 0.5 / step", |b| {
                 b.deadline.map(|_| &mut b.rate.0)
             }),
-            whole("how fast h may approach the margin; 0: as fast as the bounds can still stop, at most 0.5 / step", |b| {
-                if b.deadline.is_none() { Some(&mut b.rate.0) } else { None }
-            }),
+            whole(
+                "how fast h may approach the margin; 0: as fast as the bounds can still stop, at most 0.5 / step",
+                |b| {
+                    if b.deadline.is_none() { Some(&mut b.rate.0) } else { None }
+                },
+            ),
         ],
     },
     plain(
