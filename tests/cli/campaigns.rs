@@ -1141,7 +1141,7 @@ fn a_course_is_the_same_in_every_run() {
     let text = drifting(&workshop, 9.0).replace("runs = 1\n", "runs = 2\n");
     let (system, _) = text.split_once("[vary.").expect("the first table");
     let system = system.replace("start = { \"u.u\" = 0.0, inner", "start = { inner");
-    let course = "[vary.\"plant.u.u\"]\ndistribution = \"course\"\nvalues = [1.0, -3.0]\nperiod = 1.0\n";
+    let course = "[vary.\"plant.u.u\"]\ndistribution = \"sequence\"\nvalues = [1.0, -3.0]\nperiod = 1.0\n";
     workshop.write("c.toml", system.clone() + course);
     workshop.punctual(["campaign", "c.toml"]).success();
     let (names, rows) = rows(&workshop.path("c.parquet"));
