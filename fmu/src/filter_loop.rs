@@ -53,7 +53,7 @@ impl FilterLoop {
         }
     }
 
-    /// Where the promise stands, and why there is no plan, where plans are followed.
+    /// Status of the guarantee, and why there is no plan, where plans are followed.
     pub fn standing(&self) -> Option<(Standing, Option<Failure>)> {
         match self {
             Self::Assured(assured) => Some((assured.assurance().standing, assured.assurance().failure)),
@@ -185,7 +185,7 @@ impl FilterLoop {
         }
     }
 
-    /// Starts every deadline anew; the integral stays.
+    /// Restarts every deadline; the integral stays.
     pub fn rearm(&mut self) {
         match self {
             Self::Plain(filter) => filter.rearm(),

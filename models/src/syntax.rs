@@ -76,12 +76,12 @@ fn is_first_in_name(character: char) -> bool {
     character.is_ascii_alphabetic() || character == '_'
 }
 
-/// Whether `character` may stand in a name.
+/// Whether `character` may occur in a name.
 pub fn is_in_name(character: char) -> bool {
     character.is_ascii_alphanumeric() || character == '_'
 }
 
-/// Whether `name` stands in the text of an expression.
+/// Whether `name` occurs in the text of an expression.
 pub fn mentions(expression: &str, name: &str) -> bool {
     expression.split(|c| !is_in_name(c)).any(|word| word == name)
 }
@@ -114,7 +114,7 @@ pub(crate) enum Node {
     Call(String, Vec<Tree>),
 }
 
-/// An expression and the bytes of the text that it stands in.
+/// An expression and the bytes of the text that it is in.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Tree {
     pub(crate) node: Node,

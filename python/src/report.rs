@@ -142,7 +142,7 @@ impl Step {
         member(py, &STATUS, "Status", self.status as i32)
     }
 
-    /// Where the promise stands; `None` where no plans are followed.
+    /// Status of the guarantee; `None` where no plans are followed.
     #[getter]
     fn assurance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         self.standing.map(|standing| member(py, &ASSURANCE, "Assurance", standing as i32)).transpose()

@@ -71,7 +71,7 @@ impl Loop {
         }
     }
 
-    /// Starts every deadline anew; the integrated input stays.
+    /// Restarts every deadline; the integrated input stays.
     pub(crate) fn rearm(&mut self) {
         self.filter.rearm();
     }

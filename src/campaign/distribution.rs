@@ -22,9 +22,9 @@ pub struct VarySection {
     mean: Option<f64>,
     /// Standard deviation before the cut, likewise, > 0.
     deviation: Option<f64>,
-    /// The values to choose from, each as likely as the others; of a course one after the other.
+    /// The values to choose from, each as likely as the others; of a sequence one after the other.
     values: Option<Vec<f64>>,
-    /// Time in s for which a value of a course lasts, > 0.
+    /// Time in s for which a value of a sequence lasts, > 0.
     period: Option<f64>,
 }
 

@@ -82,7 +82,7 @@ pub fn join(campaign: &Campaign, files: &[PathBuf], output: &Path) -> Result<(),
 
 /// The files that are meant by `files`.
 fn listed(campaign: &Campaign, files: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
-    // What cannot be read is told of as a part.
+    // What cannot be read is reported as a part.
     let is_result = |file: &Path| {
         runner::recorded(file).is_ok_and(|(reader, source)| {
             source == *campaign.source()

@@ -113,7 +113,7 @@ struct BarrierReport {
     rate_times_deadline: Option<f64>,
     /// In 1/s; `null` where it is chosen at the start.
     stay_rate: Option<f64>,
-    /// Whether the rate with which the set is kept is chosen anew at every sample; it is that of the first one then.
+    /// Whether the rate with which the set is kept is chosen again at every sample; it is that of the first one then.
     #[serde(skip)]
     chosen: bool,
     margin: f64,

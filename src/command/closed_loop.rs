@@ -1,5 +1,5 @@
 //! Closed loops of `check`, on the filter's own model and with the wanted u_ref. They tell whether each promise
-//! is kept, the soonest deadline, and the smallest bounds.
+//! is kept, the earliest deadline, and the smallest bounds.
 
 use std::cell::RefCell;
 
@@ -21,7 +21,7 @@ use crate::output::{self, number, number_above, number_below};
 
 /// Most samples until a deadline; fewer where the filter's own step is longer.
 const SAMPLES: f64 = 200.0;
-/// Relative tolerance of the soonest deadline.
+/// Relative tolerance of the earliest deadline.
 const TOLERANCE: f64 = 0.02;
 /// The longest deadline looked for, in units of the configured one.
 const HORIZON: f64 = 30.0;
@@ -351,11 +351,11 @@ pub(super) struct ReachReport {
     pub(super) deadline: Verdict,
     /// Least time in s that any input within the bounds needs.
     earliest_at_least: Option<f64>,
-    /// The soonest deadline that this filter meets in simulation, or a plan in the model, in s.
+    /// The earliest deadline that this filter meets in simulation, or a plan in the model, in s.
     earliest_at_most: Option<f64>,
     /// Whether it is a plan that meets the deadline.
     by_plan: bool,
-    /// Whether it is the closed loop that meets the soonest one.
+    /// Whether it is the closed loop that meets the earliest one.
     #[serde(skip)]
     by_loop: bool,
 }
@@ -424,7 +424,8 @@ fn deadlines(c: &FilterConfiguration) -> Vec<f64> {
 }
 
 /// Limits that the bounds set to barrier `index`, of that deadline, from `x0`. `plans`: where they are followed, whether there
-/// is one for this deadline, and the soonest for which there is. `arrival`: when the closed loop that keeps everything is there.
+/// is one for this deadline, and the earliest for which there is. `arrival`: when the closed loop that keeps everything is
+/// there.
 pub(super) fn reach(
     c: &FilterConfiguration,
     (index, deadline): (usize, f64),

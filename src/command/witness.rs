@@ -23,8 +23,8 @@ pub(super) struct WitnessReport {
     /// What no plan accounts for yet, or what the nearest one fails at.
     #[serde(skip_serializing_if = "Option::is_none")]
     reason: Option<String>,
-    /// Where none ends at rest, a `plan_horizon` in s with which there is one, and the time in s until which that keeps every
-    /// promise.
+    /// Where none ends at an equilibrium, a `plan_horizon` in s with which there is one, and the time in s until which that
+    /// keeps every promise.
     #[serde(skip_serializing_if = "Option::is_none")]
     in_motion: Option<[f64; 2]>,
     /// Barriers that are not promised from there: soft, outside without a deadline, or let go before it.
@@ -34,9 +34,9 @@ pub(super) struct WitnessReport {
     has_deadline: bool,
     /// The least factor of all deadlines with which a plan was found.
     earliest_factor: Option<f64>,
-    /// The soonest deadlines in s, by barrier.
+    /// The earliest deadlines in s, by barrier.
     earliest: Vec<(String, f64)>,
-    /// The plan with the configured deadlines, or else with the soonest.
+    /// The plan with the configured deadlines, or else with the earliest.
     plan: Option<PlanReport>,
     /// Pictures of it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -46,9 +46,9 @@ pub(super) struct WitnessReport {
 /// A plan that was checked.
 #[derive(Serialize)]
 struct PlanReport {
-    /// Time in s from which the plant is at rest, where the plan ends so.
+    /// Time in s from which the plant is at an equilibrium, if the plan ends at one.
     at_equilibrium_from: Option<f64>,
-    /// Time in s until which it keeps every promise, where it ends without a rest.
+    /// Time in s until which it keeps every promise, if it ends in motion.
     until: Option<f64>,
     /// The largest size of each input, with its unit and bounds.
     inputs: Vec<(String, f64, String, [f64; 2])>,
@@ -114,7 +114,7 @@ pub(super) fn find(
     let left_out = c.barrier.iter().zip(filter.promised(t, x0)).filter(|(_, promised)| !promised);
     let left_out = left_out.map(|(barrier, _)| barrier.name.clone()).collect();
     let reason = configured.as_ref().err().map(|failure| c.refusal(*failure));
-    // Where the closed loop followed plans in the model, its inputs and the plan in hand then are one as well.
+    // Where the closed loop followed plans in the model, its inputs and the backup plan then are one as well.
     let run = run.filter(|run| !run.by_rows && c.run.simulated.is_none());
     let deadlines = |factor: f64| {
         let given = c.barrier.iter().enumerate().filter_map(|(i, b)| {
@@ -142,7 +142,7 @@ pub(super) fn find(
     }))
 }
 
-/// The soonest deadlines with a plan from `x0`, for a promise that was refused, in a line.
+/// The earliest deadlines with a plan from `x0`, for a promise that was refused, in a line.
 pub(super) fn in_time(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<String>, Error> {
     let has_deadline = c.barrier.iter().any(|barrier| barrier.deadline.is_some());
     let filter = c.assured(c.build()?).ok().filter(|_| has_deadline);
@@ -187,12 +187,12 @@ impl WitnessReport {
         self.left_out.iter().all(|name| name != barrier)
     }
 
-    /// Time in s until which the plan keeps what it does, where it ends without a rest.
+    /// Time in s until which the plan keeps what it does, if it ends in motion.
     pub(super) fn until(&self) -> Option<f64> {
         self.plan.as_ref()?.until
     }
 
-    /// The soonest deadline of `barrier` in s with a plan.
+    /// The earliest deadline of `barrier` in s with a plan.
     pub(super) fn soonest(&self, barrier: &str) -> Option<f64> {
         self.earliest.iter().find(|(name, _)| name == barrier).map(|(_, deadline)| *deadline)
     }

@@ -224,11 +224,11 @@ fn limit(what: &'static str, value: u64, unit: &'static str, allowed: u64) -> Re
 }
 
 /// Refuses a file whose end announces too many entries, before memory is taken for them. (The plain form counts
-/// in 16 bits; a larger count stands in a record of its own.)
+/// in 16 bits; a larger count is in a separate record.)
 fn announced_entries(file: &mut File) -> Result<(), FmuProblem> {
     let io = |e: io::Error| FmuProblem::Archive(e.to_string());
     let length = file.seek(SeekFrom::End(0)).map_err(io)?;
-    // The last record is 22 bytes and a comment of at most 65535; the large records stand before it.
+    // The last record is 22 bytes and a comment of at most 65535; the large records come before it.
     let tail = length.min(22 + 65_535 + 20 + 56);
     file.seek(SeekFrom::Start(length - tail)).map_err(io)?;
     let mut bytes = Vec::new();

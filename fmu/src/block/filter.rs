@@ -71,7 +71,7 @@ impl FilterBlock {
         self.filter.last_hold().unwrap_or(self.configuration.experiment.step_size)
     }
 
-    /// Where the promise stands, where plans are followed. They are not where a parameter that was set since asks for what
+    /// Status of the guarantee, where plans are followed. They are not where a parameter that was set since asks for what
     /// none accounts for.
     fn standing(&self) -> Option<(Standing, Option<Failure>)> {
         let refused = (Standing::Refused, None);
