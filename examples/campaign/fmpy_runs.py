@@ -421,5 +421,5 @@ def read(path):
     places = [name for name in paths if direct[name]]
     for (giver, output), (reader, _) in ((link["from"], link["to"]) for link in links):
         if output in direct[giver] and reader in places and places.index(reader) <= places.index(giver):
-            raise SystemExit(f"{path}: {giver}.{output} feeds through to {reader}: it must stand before {reader}")
+            raise SystemExit(f"{path}: {giver}.{output} feeds through to {reader}: it must come before {reader}")
     return system, links, [fmu.read_bytes() for fmu in paths.values()]

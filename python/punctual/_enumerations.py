@@ -51,12 +51,12 @@ class Phase(IntEnum):
     WAITING = 0
     """Not begun: no step with valid inputs yet, or not armed."""
     APPROACH = 1
-    """On the way, before the deadline."""
+    """Approaching, before the deadline."""
     LATE = 2
-    """The deadline passed outside; the approach goes on."""
+    """The deadline passed outside the set; the approach continues."""
     STAY = 3
     """Inside, and kept there."""
     LEFT = 4
     """Outside again; pulled back without a deadline."""
     RELEASED = 5
-    """Let go: nothing is asked any more."""
+    """Released: nothing is required any more."""

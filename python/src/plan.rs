@@ -159,7 +159,7 @@ impl Plan {
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let times = self.times.bind(py).readonly();
         let end = times.as_slice()?.last().copied().unwrap_or(f64::NAN);
-        let ending = if self.until.is_finite() { "until" } else { "at rest from" };
+        let ending = if self.until.is_finite() { "until" } else { "at an equilibrium from" };
         Ok(format!("Plan({ending} t={end}, effort={})", self.effort))
     }
 }

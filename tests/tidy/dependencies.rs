@@ -135,7 +135,7 @@ impl Order {
                 let excepted = self.excepted.contains(&(module, used.as_str()));
                 assert!(
                     used == module || other < rank || excepted,
-                    "{}:{line}: {module} uses {used}, which does not stand above it",
+                    "{}:{line}: {module} uses {used}, which is not above it",
                     source.path
                 );
             }
