@@ -61,7 +61,7 @@ impl FilterLoop {
         }
     }
 
-    /// The time in s until which the promise is kept, infinite for ever, where it stands.
+    /// The time in s until which the guarantee holds, infinite for ever, where it does.
     pub fn assured_until(&self) -> Option<f64> {
         match self {
             Self::Assured(assured) => assured.assurance().until,

@@ -7,7 +7,7 @@
 //! | 38 | the GUID of the FMU, as in its model description |
 //! | 8 | length of all |
 //! | … | the fields of [`State`]: mode, time, flags, values in the order of the table, memory of the block |
-//! | 8 + … | where plans are followed: the length of the commitment, and that in the format of the crate postcard |
+//! | 8 + … | where plans are followed: the length of the plan state, and that in the format of the crate postcard |
 //! | 4 | CRC-32 of all before |
 //!
 //! Numbers are little-endian, by their bits. A field has the same place in every state of an FMU; optional ones
@@ -37,7 +37,7 @@ const CHECKSUM: usize = u32::SIZE;
 ///
 /// # Errors
 ///
-/// None in practice: a commitment is plain data.
+/// None in practice: a plan state is plain data.
 pub fn size(product: &Product, state: &State) -> Result<usize, Failure> {
     let plan = if follows_plans(product) { u64::SIZE + commitment(state)?.len() } else { 0 };
     Ok(fixed_size(product) + plan)
@@ -52,7 +52,7 @@ fn follows_plans(product: &Product) -> bool {
     matches!(&product.configuration, Configuration::Filter(c) if c.is_assured())
 }
 
-/// The bytes of the commitment in `state`.
+/// The bytes of the plan state in `state`.
 fn commitment(state: &State) -> Result<Vec<u8>, Failure> {
     let commitment = match &state.block {
         BlockState::Filter { memory, .. } => memory.commitment.clone().unwrap_or_default(),
@@ -244,7 +244,7 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
     Ok(State { guid, mode, time, stop, stepped, last_step, fresh, configured, values, block })
 }
 
-/// The commitment that comes last. Whether it is one of this filter is found when it is restored.
+/// The plan state that comes last. Whether it is one of this filter is found when it is restored.
 fn read_commitment(input: &mut Reader) -> Result<Commitment, Failure> {
     let length: u64 = input.field("length of the plan")?;
     if length != input.rest.len() as u64 {

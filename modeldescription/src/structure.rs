@@ -2,7 +2,7 @@
 //!
 //! Callers have value references, and give dependencies as such. The file wants the 1-based positions of the
 //! variables, ascending. A value reference is unique only within its base type. So the translation looks among
-//! the variables that may stand there ("knowns"), and refuses a value reference that fits more than one.
+//! the variables that may be there ("knowns"), and refuses a value reference that fits more than one.
 
 use crate::validate::variable_path;
 use crate::{Causality, Error, Initial, ModelDescription, Variability, Variable};

@@ -175,7 +175,7 @@ pub struct Campaign {
 
 impl Campaign {
     /// Reads and checks the campaign file at `path` with the files that it names: its system file and the
-    /// components' FMUs (or configurations that these are built from, `.toml`). What [`Campaign::packed`] gave stands for
+    /// components' FMUs (or configurations that these are built from, `.toml`). What [`Campaign::packed`] gave replaces
     /// all of them.
     ///
     /// # Errors

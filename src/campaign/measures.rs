@@ -38,7 +38,7 @@ pub struct Measures {
 struct Seen {
     /// Number of steps by status.
     counts: [u64; Status::ALL.len()],
-    /// Number of steps by standing of its promise.
+    /// Number of steps by status of its guarantee.
     standings: [u64; Standing::ALL.len()],
     /// Largest size by input.
     peaks: Vec<f64>,

@@ -221,7 +221,7 @@ impl FixedTime {
         }
         let was_left = state.phase == Phase::Stay && is_outside;
         if let Some(recovery) = self.settings.recovery.filter(|_| was_left) {
-            // What was to be reached may be left again while its deadline is ahead, which stands.
+            // What was to be reached may be left again while its deadline, which is kept, is ahead.
             let left = state.deadline - state.elapsed(t);
             let stands = state.recoveries == 0 && !state.was_inside() && left > 0.0;
             self.anchor(state, t, &lowest, if stands { left } else { recovery }, state.period);

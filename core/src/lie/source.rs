@@ -114,12 +114,13 @@ pub trait Predict {
 
     /// Writes enclosures of the first `orders` coefficients, 1 to [`COURSE`] − 1, of ẋ under `u`: as a series in time that
     /// begins anywhere on a stretch of a path, by those of the expansions of all states that begin there. Says whether it
-    /// did: the default has none, and then what bends the plant between the instants at which it is looked at is not seen.
+    /// did: the default has none, and then what curves the plant's motion between the instants at which it is looked at is
+    /// not seen.
     fn rates_over(&self, _path: &[CourseOver], _u: &[f64], _orders: usize, _out: &mut [RateOver]) -> bool {
         false
     }
 
-    /// An enclosure of h on such a stretch, at those of the time (s). The default has none: then what bends h between the
+    /// An enclosure of h on such a stretch, at those of the time (s). The default has none: then what curves h between the
     /// instants at which it is looked at is not seen.
     fn value_over(&self, _time: Interval, _path: &[CourseOver]) -> Option<Interval> {
         None

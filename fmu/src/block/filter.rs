@@ -18,7 +18,7 @@ pub(super) struct FilterBlock {
     filter: FilterLoop,
     /// `rearm` at the last step: a rising edge re-arms.
     rearm_seen: bool,
-    /// The standing of the promise that was last spoken of.
+    /// The status of the guarantee that was last logged.
     noticed: Option<Standing>,
     /// Scratch: the state to go back to after looking ahead over a re-arming.
     kept: LoopState,
@@ -90,7 +90,7 @@ impl FilterBlock {
         self.after_barriers() + of_plans + usize::from(self.configuration.ends_plans())
     }
 
-    /// Writes status of the guarantee, why u_ref was changed, and at `t` until when the promise stands.
+    /// Writes the status of the guarantee, why u_ref was changed, and at `t` until when the guarantee holds.
     fn write_standing(&self, standing: Standing, t: f64, values: &mut Values) {
         let at = self.after_barriers();
         values.integers[at] = standing as i32;
@@ -183,7 +183,7 @@ impl Block for FilterBlock {
         let mut at = self.layout.outputs;
         let inputs = self.layout.inputs;
         derivative[at..][..inputs].copy_from_slice(&self.change.u[..inputs]);
-        // The output `status` stands in between.
+        // The output `status` is in between.
         at += inputs + 1;
         for b in &self.change.barriers {
             for (i, output) in (at..).zip(&BARRIER_OUTPUTS) {

@@ -80,7 +80,7 @@ pub(super) enum FilterKind {
 /// The largest budget of a search.
 const MOST_PROGRAMS: u64 = 1_000_000;
 
-/// A filter as it stands in a file.
+/// A filter as written in a file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawFilter {
@@ -135,15 +135,15 @@ pub struct FilterConfiguration {
     /// Whether the filter promises only what a plan keeps.
     #[serde(skip_serializing_if = "is_auto")]
     pub assurance: AssuranceName,
-    /// The time in s, > 0, for which a plan has to reach past the last deadline and the sample where none ends at rest; `None`:
-    /// every plan has to end at rest.
+    /// The time in s, > 0, for which a plan has to reach past the last deadline and the sample where none ends at an
+    /// equilibrium; `None`: every plan has to end at an equilibrium.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plan_horizon: Option<f64>,
     /// The most quadratic programs of a search for a plan at one sample after the first, ≥ 1; `None`:
     /// [`AssuredFilter::PROGRAMS`](punctual_core::filter::AssuredFilter::PROGRAMS).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub search_budget: Option<u32>,
-    /// Why no plan is followed, as the file stands; `None` where plans are.
+    /// Why no plan is followed, with the file as it is; `None` where plans are.
     #[serde(skip)]
     rows_only: Option<RowsOnly>,
     /// Time in s until a computed input acts, ≥ 0, at most the step size: a communication step with a
@@ -664,7 +664,7 @@ impl FilterConfiguration {
         self.rows_only.is_none()
     }
 
-    /// Whether its plans may end without a rest, so that it tells until when it promises.
+    /// Whether its plans may end in motion, so that it reports until when it promises.
     pub fn ends_plans(&self) -> bool {
         self.is_assured() && self.plan_horizon.is_some()
     }

@@ -192,7 +192,7 @@ pub(super) enum PlantKind {
     Plant,
 }
 
-/// A plant as it stands in a file.
+/// A plant as written in a file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawPlant {
