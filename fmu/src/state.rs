@@ -368,7 +368,7 @@ impl Field for Phase {
     fn read(input: &mut Reader) -> Result<Self, Failure> {
         let number = u8::read(input)?;
         let known = Self::ALL.into_iter().find(|phase| *phase as u8 == number);
-        known.ok_or_else(|| format!("is {number}, which is no Phase"))
+        known.ok_or_else(|| format!("is {number}, which is not a Phase"))
     }
 }
 

@@ -233,7 +233,7 @@ impl Campaign {
     fn unpacked(text: &str, path: &Path) -> Result<Self, Error> {
         let wrong = |message: String| Error::configuration("", format!("{}: {message}", path.display()));
         let Packed { version, fingerprint, runs, source } = serde_json::from_str(text)
-            .map_err(|e| wrong(format!("is no whole campaign that `--pack` wrote: {e}")))?;
+            .map_err(|e| wrong(format!("is not a complete campaign written by `--pack`: {e}")))?;
         let ours = env!("CARGO_PKG_VERSION");
         if version != ours {
             return Err(wrong(format!(

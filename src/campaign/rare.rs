@@ -139,7 +139,7 @@ pub fn rare(
         splitting::estimate(plan, &found[..repeats])
     else {
         let message = format!(
-            "none of {repeats} repeats came to a failure that the pilot had found; give more, such as --rare={}",
+            "none of {repeats} repeats reached a failure that the pilot had found; give more, such as --rare={}",
             10 * repeats
         );
         return Err(Error::configuration("--rare", message));
@@ -238,7 +238,7 @@ fn check(campaign: &Campaign, output: &Path) -> Result<(), Error> {
         return wrong("vary", "is empty, so that all runs are alike");
     }
     if output.exists() {
-        let message = format!("{} is there already; remove it, or give another output", output.display());
+        let message = format!("{} already exists; remove it, or give another output", output.display());
         return wrong("--output", &message);
     }
     Ok(())

@@ -337,7 +337,7 @@ fn start(arguments: &Arguments, configuration: &FilterConfiguration) -> Result<O
             part.split_once('=').ok_or_else(|| refuse(format!("is {part:?}, must be like {:?}", "v=1.5")))?;
         let Some(index) = names.iter().position(|n| n == name.trim()) else {
             return Err(refuse(format!(
-                "{:?} is no state, must be one of {}",
+                "{:?} is not a state, must be one of {}",
                 name.trim(),
                 names.join(", ")
             )));

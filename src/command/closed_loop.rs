@@ -80,7 +80,7 @@ impl Wanted {
             };
             let Some(index) = inputs.iter().position(|input| input == name.trim()) else {
                 return refuse(format!(
-                    "{:?} is no input, must be one of {}",
+                    "{:?} is not an input, must be one of {}",
                     name.trim(),
                     inputs.join(", ")
                 ));

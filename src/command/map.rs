@@ -58,7 +58,7 @@ impl Plane {
             let names: Vec<_> = states.iter().map(|s| s.name.as_str()).collect();
             let state = names.iter().position(|n| *n == name);
             let state = state.ok_or_else(|| {
-                refuse(format!("{name:?} is no state, must be one of {}", names.join(", ")))
+                refuse(format!("{name:?} is not a state, must be one of {}", names.join(", ")))
             })?;
             Ok((state, [low, high]))
         };

@@ -540,7 +540,7 @@ impl<'a> Resolver<'a> {
         let unknown = links.iter().filter(|link| is_unknown(self.variable(link.from)));
         let note = |link: &Link| {
             let (from, to) = (self.name(link.from), self.name(link.to));
-            format!("{from} is no output, so it is not read during the initialisation: {to} gets 0 there")
+            format!("{from} is not an output, so it is not read during the initialisation: {to} gets 0 there")
         };
         unknown.map(note).collect()
     }

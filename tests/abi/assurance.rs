@@ -230,7 +230,7 @@ fn what_is_not_promised_is_said_in_words() {
         assert_eq!(slave.integer("assurance"), Standing::Assured as i32);
     }
     let said = slave.log.messages();
-    assert!(said.len() == 2 && said[1].starts_with("the promise is assured again"), "{said:?}");
+    assert!(said.len() == 2 && said[1].starts_with("the guarantee is regained"), "{said:?}");
     // What is read ahead of the step that decides anew is what the step says.
     slave.set_flag("rearm", true);
     sample(&slave, [0.0, 0.0, 1.0, 0.0]);

@@ -79,7 +79,7 @@ fn a_new_file_is_checked_and_run_and_keeps_its_promise() {
         workshop.punctual(["build", "my.toml", "-o", "my.fmu"]).success();
         workshop
             .punctual(["new", "my.toml"])
-            .fails(2, "FILE: my.toml is there already; name another file, or remove that one");
+            .fails(2, "FILE: my.toml already exists; name another file, or remove that one");
     }
     Workshop::new().punctual(["new", "my.fmu"]).fails(2, "FILE: is \"my.fmu\", must end in .toml");
 }
@@ -466,7 +466,7 @@ fn an_aeroplane_that_cannot_stop_is_promised_to_loiter() {
         "{checked}"
     );
     assert!(
-        checked.contains("whatever u_ref is, until 60.8 s; it is prolonged where one is found"),
+        checked.contains("whatever u_ref is, until 60.8 s; it is extended if a longer one is found"),
         "{checked}"
     );
     workshop.punctual(["run", "plane.toml", "--require", "on_time_and_inside"]).success();

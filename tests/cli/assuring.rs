@@ -195,7 +195,7 @@ fn starts_that_can_be_promised_are_drawn() {
     }
     for (ranges, message) in [
         ("x_p=0..1", "is \"x_p=0..1\", must be two states, like \"x_p=-5..25,y_p=-5..15\""),
-        ("x_p=0..1,z=0..1", "\"z\" is no state, must be one of x_p, y_p, theta, v"),
+        ("x_p=0..1,z=0..1", "\"z\" is not a state, must be one of x_p, y_p, theta, v"),
         ("x_p=1..0,y_p=0..1", "has \"x_p=1..0\", must go from less to more"),
         ("x_p=0..nan,y_p=0..1", "has \"x_p=0..nan\", must be like \"x_p=-5..25\""),
     ] {

@@ -62,7 +62,7 @@ fn a_filter_that_is_given_the_derivatives() {
         (&["--x0", start, "--effort"], "--effort: simulates, but barrier goal is external: it has no model"),
         (
             &["--x0", "x_p=1"],
-            "--x0: \"x_p\" is no state, must be one of goal.lf0, goal.lf1, goal.lf2, goal.lg.u_x, goal.lg.u_y, speed.lf0, speed.lf1, speed.lg.u_x, speed.lg.u_y",
+            "--x0: \"x_p\" is not a state, must be one of goal.lf0, goal.lf1, goal.lf2, goal.lg.u_x, goal.lg.u_y, speed.lf0, speed.lf1, speed.lg.u_x, speed.lg.u_y",
         ),
     ] {
         workshop.punctual(["check", "external.toml"].iter().chain(arguments)).fails(2, message);
@@ -165,7 +165,7 @@ fn a_mixed_relative_degree_is_refused() {
 fn starts_that_cannot_be_used() {
     let workshop = workshop(&[]);
     for (x0, message) in [
-        ("w=1", "--x0: \"w\" is no state, must be one of x_p, y_p, theta, v"),
+        ("w=1", "--x0: \"w\" is not a state, must be one of x_p, y_p, theta, v"),
         ("v", "--x0: is \"v\", must be like \"v=1.5\""),
         ("v=nan", "--x0: is \"v=nan\", must be a finite number"),
     ] {

@@ -234,7 +234,7 @@ fn local_variables_are_recorded_and_connected() {
         );
         let done = workshop.punctual(["run", "system.toml", "--out", "out"]);
         let note =
-            "note: one.y is no output, so it is not read during the initialisation: two.u gets 0 there\n";
+            "note: one.y is not an output, so it is not read during the initialisation: two.u gets 0 there\n";
         assert!(done.code == 0 && done.stderr.contains(note), "{done:#?}");
         let table = Table::parse(&workshop.text("out/system.csv"));
         assert_eq!((table.column("one.y"), table.column("two.u")), (steps.clone(), steps.clone()), "{order}");
