@@ -382,7 +382,7 @@ fn filter(
     if arm_after > 0.0 {
         let seconds = number(arm_after);
         warnings.push(format!(
-            "the filter is armed {seconds} s after its first step: until then nothing is promised; statements about a start refer to\
+            "the filter is armed {seconds} s after its first step: until then nothing is promised; statements about a start refer to \
              the state at that time"
         ));
     }
@@ -582,7 +582,7 @@ fn in_vain(c: &FilterConfiguration) -> Vec<String> {
     let pairs = c.apart().into_iter().filter(|pair| pair.iter().all(is_kept));
     pairs
         .filter_map(|pair| c.apart_in_words(pair))
-        .map(|words| format!("{words}, and neither is ever let go"))
+        .map(|words| format!("{words}, and neither is ever released"))
         .collect()
 }
 

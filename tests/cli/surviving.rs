@@ -317,7 +317,7 @@ fn other_interfaces_and_versions_are_out_of_scope() {
         let other = description("none", &[("fmiVersion=\"2.0\"", &format!("fmiVersion=\"{version}\""))]);
         misbehaving::write(&workshop, "one.fmu", other, &misbehaving::library(&[]));
         let message = format!(
-            "one.fmu: cannot be run here: it is of FMI {version}, and this program is for FMI 2.0 and 3.0; export it again as\
+            "one.fmu: cannot be run here: it is of FMI {version}, and this program is for FMI 2.0 and 3.0; export it again as \
              one of these"
         );
         for command in ["validate", "inspect"] {

@@ -233,7 +233,7 @@ pub(super) static SECTION: Section = Section {
                 Word(AssuranceName::WORDS),
                 Some("`auto`"),
                 "`on`: the filter promises only what a plan within the bounds keeps, whatever u_ref is, and follows it where it \
-                 must ([guarantees](guarantees.md#will-it-always)). The plan is sought at the first step; if none is found,\
+                 must ([guarantees](guarantees.md#will-it-always)). The plan is sought at the first step; if none is found, \
                  nothing is promised. Needs a model to run ahead, sets that stay where they are, no delay, no errors. `off`: the rows \
                  alone. `auto`: `on` where that is possible and every input has bounds, else `off`. Where every input has bounds, a \
                  warning names the keys that switch it off for all barriers",
@@ -242,16 +242,16 @@ pub(super) static SECTION: Section = Section {
                 "plan_horizon",
                 Number(Is("s"), Range::POSITIVE),
                 Some("none: every plan ends at an equilibrium"),
-                "if no plan ends at an equilibrium, as for an aeroplane or a set that moves for ever: how far a plan has to reach\
-                 past the last deadline and the present. The promise holds until its end, `assured_until`. It is extended before it ends, if a\
+                "if no plan ends at an equilibrium, as for an aeroplane or a set that moves for ever: how far a plan has to reach \
+                 past the last deadline and the present. The promise holds until its end, `assured_until`. It is extended before it ends, if a \
                  longer plan is found",
             ),
             Key::new(
                 "search_budget",
                 Count(1, MOST_PROGRAMS),
                 Some("3 where plans are followed"),
-                "the most quadratic programs that a search for a plan solves at one step after the first; it continues at the next\
-                 step, and meanwhile the current plan drives. With more, a plan for u_ref, or one in place of a lost plan, is found in fewer steps,\
+                "the most quadratic programs that a search for a plan solves at one step after the first; it continues at the next \
+                 step, and meanwhile the current plan drives. With more, a plan for u_ref, or one in place of a lost plan, is found in fewer steps, \
                  each of which may take longer: about 0.3 ms per program for a vehicle, and more with more states, inputs and barriers",
             ),
             Key::new(
@@ -265,7 +265,7 @@ pub(super) static SECTION: Section = Section {
                 "period_max",
                 Number(Is("s"), Range::NON_NEGATIVE),
                 Some("0"),
-                "the longest time between two steps; the rows then hold for steps of any length up to it, and a late\
+                "the longest time between two steps; the rows then hold for steps of any length up to it, and a late \
                  step seldom ends a plan. 0: as long as the previous ones",
             ),
             Key::new(
@@ -292,7 +292,7 @@ pub(super) static SECTION: Section = Section {
                 "policy",
                 TextByName,
                 Some("none"),
-                "for each input of the model the [expression](#expressions) of a controller that may keep the promises, in\
+                "for each input of the model the [expression](#expressions) of a controller that may keep the promises, in \
                  states, parameters and `t`: a search for a plan starts from it too. No guarantee depends on it",
             ),
             Key::new(
@@ -755,7 +755,7 @@ impl FilterConfiguration {
                     .to_owned()
             }
             Failure::NoRest => "no plan reaches as far as plan_horizon".to_owned(),
-            Failure::Unsteady => "the plant is so unstable along the plan that a deviation too small to measure grows until the\
+            Failure::Unsteady => "the plant is so unstable along the plan that a deviation too small to measure grows until the \
                                   plan is lost; with wider bounds, or from a start farther from where they no longer suffice, it could be held"
                 .to_owned(),
             Failure::Apart { barriers, contained } => {

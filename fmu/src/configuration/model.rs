@@ -194,7 +194,7 @@ pub(super) static VARIABLE: Section = Section {
                 "min",
                 Number(Of("in its unit"), Range::FINITE),
                 Some("none"),
-                "of a state: the range for which the model is meant, and in which the relative degree is determined; of\
+                "of a state: the range for which the model is meant, and in which the relative degree is determined; of \
                  an input: its bound if `[bounds]` gives none",
             ),
             Key::new("max", Number(Of("in its unit"), Range::FINITE), Some("none"), "the same from above"),

@@ -92,7 +92,7 @@ static KEYS: [Row; 33] = [
             name: "rate",
             value: Number(Is("1/s"), Range::NON_NEGATIVE),
             default: Some("0"),
-            meaning: "decay of an error against the profile; 0 means 20/`deadline`, without a deadline as fast as the\
+            meaning: "decay of an error against the profile; 0 means 20/`deadline`, without a deadline as fast as the \
                       bounds can still stop; at most 0.5/step",
         },
         parameters: &[
@@ -158,7 +158,7 @@ static KEYS: [Row; 33] = [
         "when_infeasible",
         Word(InfeasibleName::WORDS),
         Some("`report`"),
-        "`report`, or `earliest`: replaces a deadline that the bounds certainly do not allow by a later one; with `assurance`, one\
+        "`report`, or `earliest`: replaces a deadline that the bounds certainly do not allow by a later one; with `assurance`, one \
          that no plan keeps by the earliest that a plan keeps",
     ),
     plain(
