@@ -140,7 +140,7 @@ impl Archive {
             let folder = entry.trim_end_matches(MODEL_DESCRIPTION);
             let text = format!(
                 "is not at the top of the archive, but in {folder}: an FMU holds what is in that folder, without the \
-                 folder; archive it anew from inside"
+                 folder; archive it again from inside"
             );
             return Err(FmuProblem::Description(text));
         }

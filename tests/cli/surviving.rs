@@ -341,7 +341,7 @@ fn a_folder_around_everything_is_told() {
     archive.add("my model/resources/x.txt", "x").expect("an entry");
     workshop.write("one.fmu", archive.to_bytes().expect("an archive"));
     let message = "modelDescription.xml: is not at the top of the archive, but in my model/: an FMU holds what is in that \
-                   folder, without the folder; archive it anew from inside";
+                   folder, without the folder; archive it again from inside";
     workshop.punctual(["inspect", "one.fmu"]).fails(1, &format!("one.fmu: {message}"));
     let done = workshop.punctual(["validate", "one.fmu"]);
     assert!(done.code == 1 && done.stdout.contains(message), "{done:#?}");

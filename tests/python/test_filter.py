@@ -290,7 +290,7 @@ def driven(own, steps, x, u_ref):
 
 
 def planned(own):
-    """The plan in hand, as bits."""
+    """The backup plan, as bits."""
     plan = own.plan
     return plan and [plan.times.tobytes(), plan.x.tobytes(), plan.u.tobytes(), plan.effort, plan.tightest]
 
