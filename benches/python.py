@@ -121,9 +121,9 @@ def in_rust():
 
 
 def print_in_rust(times):
-    columns = ["pointwise", "1 ms", "10 ms", "50 ms", "witness"]
+    columns = ["pointwise", "1 ms", "10 ms", "50 ms", "backup plan"]
     by_hand = float(times["by hand"])
-    print(f"a step in Rust, ns and times by hand ({by_hand:.1f} ns); the default at three periods; with a witness at 10 ms")
+    print(f"a step in Rust, ns and times by hand ({by_hand:.1f} ns); the default at three periods; with a backup plan at 10 ms")
     print(f"  {'':25}" + "".join(f"{column:>18}" for column in columns))
     for vehicle in ["point mass", "unicycle", "bicycle"]:
         for obstacles in [0, 10]:

@@ -93,7 +93,7 @@ where
             let time = rows(&plant, held(), 1e-3 * f64::from(period));
             line(&format!("{name}, {obstacles} obstacles, {period} ms"), time);
         }
-        let row = format!("{name}, {obstacles} obstacles, witness");
+        let row = format!("{name}, {obstacles} obstacles, backup plan");
         let Some(times) = witnessed(&plant, held, bounds) else {
             println!("{row}\trefused");
             continue;

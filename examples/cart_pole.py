@@ -68,7 +68,7 @@ def integrated(x, u, duration):
 print(punctual.to_toml(FILTER))
 
 way = punctual.plan(FILTER, [0.0, 0.0, 0.0, 0.0])
-print(f"a plan: at rest from {way.times[-1]:.2f} s, with {100 * way.effort:.0f} % of the force")
+print(f"a plan: at an equilibrium from {way.times[-1]:.2f} s, with {100 * way.effort:.0f} % of the force")
 
 filter, x, rows = punctual.Filter(FILTER), np.zeros(4), []
 for k in range(round(STOP / STEP)):

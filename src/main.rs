@@ -1,4 +1,4 @@
-//! The `punctual` command line: arguments in, exit code out. The commands stand in [`punctual::command`]; nothing
+//! The `punctual` command line: arguments in, exit code out. The commands are in [`punctual::command`]; nothing
 //! is printed but through [`punctual::output`].
 #![forbid(unsafe_code)]
 // Elementary functions are those of the core: clippy.toml.
@@ -53,10 +53,10 @@ enum Command {
     Completions(shell::CompletionArguments),
     /// Write man pages
     Man(shell::ManArguments),
-    /// The part of `validate` that may crash, in a process of its own
+    /// The part of `validate` that may crash, in a separate process
     #[command(hide = true)]
     Trial(validate::TrialArguments),
-    /// A plug-in, loaded in a process of its own
+    /// A plug-in, loaded in a separate process
     #[command(hide = true)]
     TryPlugin(build::TryPluginArguments),
 }

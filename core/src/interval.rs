@@ -87,7 +87,7 @@ impl Interval {
 /// Half the width of an angle whose sine and cosine are enclosed by those of its middle: one evaluation in place of four.
 const NARROW: f64 = 0.05;
 
-/// The lesser of two numbers: one instruction, where one that looks for not-a-number has several.
+/// The lesser of two numbers: one instruction, where one that looks for NaN has several.
 #[inline]
 fn least(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }

@@ -14,7 +14,7 @@ const SAME_TIME: f64 = 1e-9;
 /// Instants that a cubic goes through, besides the newest.
 const BEFORE: usize = 3;
 
-/// The course of h from one instant to the next.
+/// How h runs from one instant to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Course {
     /// Along a straight line: relative degree 1, or instants that are close.
@@ -23,7 +23,7 @@ pub enum Course {
     Smooth,
 }
 
-/// The standing of a barrier at an instant.
+/// The state of a barrier's promise at an instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Standing {
     /// Not enforced yet.
@@ -207,7 +207,7 @@ impl Judge {
         seen
     }
 
-    /// Whether h counts as inside; not-a-number does not.
+    /// Whether h counts as inside; NaN does not.
     fn is_inside(&self, h: f64) -> bool {
         h >= -(TOLERANCE * self.size).max(LEAST_TOLERANCE)
     }

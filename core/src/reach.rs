@@ -1,4 +1,4 @@
-//! The limits of bounded inputs: how high h can be at a time, whether a deadline is lost, and the soonest time at which
+//! The limits of bounded inputs: how high h can be at a time, whether a deadline is lost, and the earliest time at which
 //! h ≥ 0 is not ruled out.
 //!
 //! A source bounds h over every state that bounded inputs reach between two times ([`DerivativeSource::highest`]).
@@ -52,8 +52,8 @@ pub(crate) fn ruled_out(
 /// let source = lie::along(PointMass, HalfPlane::new([1.0, 0.0], [9.0, 0.0])?, 2)?;
 /// let mut bounds = Bounds::NONE;
 /// (bounds.min[..2].fill(-2.0), bounds.max[..2].fill(2.0));
-/// let soonest = reach::soonest(&*source, (0.0, &[0.0; 4]), &bounds, 100.0).expect("known");
-/// assert!((soonest - 3.0).abs() < 1e-6);
+/// let earliest = reach::soonest(&*source, (0.0, &[0.0; 4]), &bounds, 100.0).expect("known");
+/// assert!((earliest - 3.0).abs() < 1e-6);
 /// # Ok::<(), punctual_core::Error>(())
 /// ```
 pub fn soonest(

@@ -174,7 +174,7 @@ fn a_declared_degree_is_compared() {
     assert_eq!(
         declared(2, &[]).expect_err("refused").to_string(),
         "goal.relative_degree: is not known: model or barrier is not finite at any sample state, declared is 2; \
-         give samples of your own"
+         provide your own samples"
     );
 }
 

@@ -12,8 +12,8 @@ const OTHERS: [(&[u8], &str); 4] = [
         "it is an archive, such as an FMU, and no text; `punctual inspect` and `punctual validate` take FMUs",
     ),
     (b"PAR1", "it is a Parquet file and no text; `punctual replay` takes one that `punctual campaign` wrote"),
-    (b"\xff\xfe", "it is in UTF-16, must be in UTF-8; editors save it so"),
-    (b"\xfe\xff", "it is in UTF-16, must be in UTF-8; editors save it so"),
+    (b"\xff\xfe", "it is in UTF-16, must be in UTF-8; save the file as UTF-8"),
+    (b"\xfe\xff", "it is in UTF-16, must be in UTF-8; save the file as UTF-8"),
 ];
 
 /// Whether the name of the file ends in `.toml`.
@@ -38,6 +38,6 @@ pub fn read(path: &Path) -> Result<String, Error> {
     String::from_utf8(bytes).map_err(|e| {
         let before = &e.as_bytes()[..e.utf8_error().valid_up_to()];
         let line = before.iter().filter(|byte| **byte == b'\n').count() + 1;
-        refuse(format!("line {line} is no text in UTF-8, as all of it must be; editors save it so"))
+        refuse(format!("line {line} is not valid UTF-8; save the file as UTF-8"))
     })
 }

@@ -133,7 +133,7 @@ class Judge:
     def inside(self, h):
         return h >= -max(TOLERANCE * self.size, LEAST_TOLERANCE)
 
-    def see(self, t, h, standing, lost):
+    def see(self, t, h, promise_state, lost):
         if self.released or not self.before and not math.isfinite(h):
             return
         if not self.before:
@@ -142,17 +142,17 @@ class Judge:
             self.size = max(self.size, abs(h))
         if lost and self.certain is None:
             self.certain = t
-        if standing != "waiting" and self.began is None:
+        if promise_state != "waiting" and self.began is None:
             self.began, self.began_inside = t, self.inside(h)
         self.follow(t, h)
         self.judge(t, h)
-        always = self.began_inside and standing != "waiting"
-        if standing != "released" and (always or self.due):
+        always = self.began_inside and promise_state != "waiting"
+        if promise_state != "released" and (always or self.due):
             self.weigh(h)
             if not self.inside(h) and self.arrival is not None and self.left is None:
                 at = self.left_before
                 self.left = at if at is not None and (always or at >= self.deadline) else t
-        self.released = standing == "released"
+        self.released = promise_state == "released"
         self.reached |= self.released and self.arrival is not None
         self.before = [(t, h), *self.before[:2]]
 
@@ -230,11 +230,11 @@ class Filter:
     def __init__(self, block, values):
         self.block = block
         self.statuses = items(block, "status")
-        self.standings = items(block, "assurance") if "assurance" in block.outputs else {}
+        self.assurances = items(block, "assurance") if "assurance" in block.outputs else {}
         self.abstentions = {self.statuses[name] for name in ABSTENTIONS}
         self.waiting = self.statuses["not_armed"]
         self.counts = dict.fromkeys(self.statuses.values(), 0)
-        self.stood = dict.fromkeys(self.standings.values(), 0)
+        self.counted = dict.fromkeys(self.assurances.values(), 0)
         self.peaks = dict.fromkeys(block.efforts, 0.0)
         self.barriers = {}
         for name in block.barriers:
@@ -252,9 +252,9 @@ class Filter:
         array, i = outputs["status"]
         status = array[i]
         self.counts[status] += 1
-        if self.stood:
+        if self.counted:
             array, i = outputs["assurance"]
-            self.stood[array[i]] += 1
+            self.counted[array[i]] += 1
         for name, peak in self.peaks.items():
             array, i = outputs[name]
             if abs(array[i]) > peak:
@@ -263,8 +263,8 @@ class Filter:
             h, phase, unmet, slack, late = [array[i] for array, i in slots]
             kept["started"] |= status not in self.abstentions and status != self.waiting
             if kept["started"]:
-                standing = {phases["released"]: "released", phases["waiting"]: "waiting"}.get(phase, "in force")
-                kept["judge"].see(time, h, standing, bool(late) or phase == phases["late"])
+                promise_state = {phases["released"]: "released", phases["waiting"]: "waiting"}.get(phase, "in force")
+                kept["judge"].see(time, h, promise_state, bool(late) or phase == phases["late"])
             if unmet > 0 or status in self.abstentions:
                 kept["unmet"] += 1
                 kept["row"] += 1
@@ -277,7 +277,7 @@ class Filter:
         """The filter's part of the row, and by barrier what `campaign.success` may ask for."""
         block = self.block.name
         cells = {f"{block}.status.{name}": self.counts[number] for name, number in self.statuses.items()}
-        cells |= {f"{block}.assurance.{name}": self.stood[number] for name, number in self.standings.items()}
+        cells |= {f"{block}.assurance.{name}": self.counted[number] for name, number in self.assurances.items()}
         cells |= {f"{block}.peak.{name.removeprefix('u.')}": peak for name, peak in self.peaks.items()}
         verdicts = []
         for name, (kept, _, _) in self.barriers.items():
@@ -421,5 +421,5 @@ def read(path):
     places = [name for name in paths if direct[name]]
     for (giver, output), (reader, _) in ((link["from"], link["to"]) for link in links):
         if output in direct[giver] and reader in places and places.index(reader) <= places.index(giver):
-            raise SystemExit(f"{path}: {giver}.{output} feeds through to {reader}: it must stand before {reader}")
+            raise SystemExit(f"{path}: {giver}.{output} feeds through to {reader}: it must come before {reader}")
     return system, links, [fmu.read_bytes() for fmu in paths.values()]

@@ -15,7 +15,7 @@
  * NUMBERS. The functions of a model do not get plain doubles but names of numbers (punctual_number), and ask for
  * operations on them: behind each name are the Taylor coefficients of that number along a solution, with their
  * derivatives along inputs and directions, and the operations below do what is right on all of them. So f, g and h are
- * written once, as they stand on paper, and the derivatives of h, of any order, are exact. A name is valid within the
+ * written once, as on paper, and the derivatives of h, of any order, are exact. A name is valid within the
  * call in which it was given.
  *
  * RULES. What the functions write may depend on their arguments only: no memory of earlier calls, no clock, no random

@@ -9,7 +9,7 @@
 //! change.
 //!
 //! **Steps taken back.** Importers that restore a state may forget to turn their own clock back (MasterSim does). So the
-//! first step after a restore may be told any time within the steps that it took back, and starts at the
+//! first step after a restore may be given any time within the steps that it took back, and starts at the
 //! restored one. How far these went is known to the instance and is no part of a snapshot: a restored state has the
 //! bytes that it had, and with right times it decides nothing.
 
@@ -144,14 +144,14 @@ impl Unbroken {
     }
 }
 
-/// Whether a step was told a time within the steps taken back, for the log.
+/// Whether a step was given a time within the steps taken back, for the log.
 #[derive(Clone, Copy, Debug)]
 enum Mistimed {
     /// Not in this run.
     Never,
     /// For the first time, `given` in place of `restored`, in s.
     First { given: f64, restored: f64 },
-    /// As was told.
+    /// As was reported.
     Told,
 }
 
@@ -167,7 +167,7 @@ pub struct State {
     pub mode: Mode,
     /// The communication point in s.
     pub time: f64,
-    /// The end of the run in s, past which FMI 3.0 allows no step; infinite where none was told, and with FMI 2.0.
+    /// The end of the run in s, past which FMI 3.0 allows no step; infinite where none was given, and with FMI 2.0.
     pub stop: f64,
     /// Whether a step was made since initialization.
     pub stepped: bool,
@@ -519,7 +519,7 @@ impl Instance {
         self.mistimed = Mistimed::Told;
         format!(
             "currentCommunicationPoint is {given}, must be the restored one, {restored}: the step is made from there, \
-             as every such step after a restore (told once)"
+             as every such step after a restore (reported once)"
         )
     }
 
@@ -575,7 +575,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Where a step begins that is told the time `t`, more than `same` after the present one; whether that is a wrong time
+    /// Where a step begins that is given the time `t`, more than `same` after the present one; whether that is a wrong time
     /// after a restore; and the unbroken steps before it.
     fn after_gap(&self, t: f64, same: f64) -> Result<(f64, bool, Unbroken), Failure> {
         let (gap, rounding, unbroken) = (t - self.time, GAP * self.last_step, self.unbroken);

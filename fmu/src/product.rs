@@ -30,7 +30,7 @@ pub const LOG_CATEGORIES: [(&str, &str); 3] = [
     ("logEvents", "what happened: instantiation, initialization, reset"),
     (
         "logStatusWarning",
-        "promises that were refused or withdrawn, with the reason, or given again; times of steps that were taken back",
+        "guarantees that were refused or lost, with the reason, or regained; times of steps that were rolled back",
     ),
 ];
 
@@ -231,7 +231,7 @@ fn status_type() -> SimpleType {
 
 fn phase_type() -> SimpleType {
     let items = Phase::ALL.map(|phase| (phase.name(), phase as i32, phase.meaning()));
-    enumeration(PHASE, "Where a barrier stands with its promise", &items)
+    enumeration(PHASE, "Phase of a barrier's promise", &items)
 }
 
 /// The enumeration type of `assurance`.
@@ -239,7 +239,7 @@ const ASSURANCE: &str = "Assurance";
 
 fn assurance_type() -> SimpleType {
     let items = Standing::ALL.map(|standing| (standing.name(), standing as i32, standing.meaning()));
-    enumeration(ASSURANCE, "Where the promise of a filter that follows plans stands", &items)
+    enumeration(ASSURANCE, "Status of the guarantee of a filter that follows plans", &items)
 }
 
 /// Collects variables; the value reference is the index.
@@ -365,7 +365,7 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
         table.signal("u_ref", input, "wanted ", Causality::Input);
     }
     let rearm = VariableKind::Boolean(Plain { start: Some(false), declared_type: None });
-    table.add("rearm".into(), "a rising edge starts every deadline anew", Causality::Input, rearm);
+    table.add("rearm".into(), "a rising edge restarts every deadline", Causality::Input, rearm);
 
     let outputs = table.variables.len();
     let output = Causality::Output;
@@ -388,14 +388,15 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
         }
     }
     if c.is_assured() {
-        table.add("assurance".into(), "where the promise stands", output, enumerated(ASSURANCE));
+        table.add("assurance".into(), "status of the guarantee", output, enumerated(ASSURANCE));
         let most = c.barrier.len() as i32;
         let number = VariableKind::Integer(Integer { min: Some(0), max: Some(most), ..Integer::default() });
         let reason = "number of the barrier for which u_ref was changed, in their order; 0 for none";
         table.add("reason".into(), reason, output, number);
     }
     if c.ends_plans() {
-        let until = "time until which the promise is kept, 1e30 for ever; now, where nothing is assured";
+        let until =
+            "time until which the guarantee holds, 1e30 for ever; the current time if nothing is assured";
         table.add("assured_until".into(), until, output, real(None, "s"));
     }
     if let Some(integrator) = &c.integrator {

@@ -7,7 +7,7 @@
 //! | 38 | the GUID of the FMU, as in its model description |
 //! | 8 | length of all |
 //! | … | the fields of [`State`]: mode, time, flags, values in the order of the table, memory of the block |
-//! | 8 + … | where plans are followed: the length of their memory, and that in the format of the crate postcard |
+//! | 8 + … | where plans are followed: the length of the plan state, and that in the format of the crate postcard |
 //! | 4 | CRC-32 of all before |
 //!
 //! Numbers are little-endian, by their bits. A field has the same place in every state of an FMU; optional ones
@@ -36,7 +36,7 @@ const CHECKSUM: usize = u32::SIZE;
 ///
 /// # Errors
 ///
-/// None in practice: a plan is plain data.
+/// None in practice: a plan state is plain data.
 pub fn size(product: &Product, state: &State) -> Result<usize, Failure> {
     let plan = if follows_plans(product) { u64::SIZE + plan(state)?.len() } else { 0 };
     Ok(fixed_size(product) + plan)
@@ -51,7 +51,7 @@ fn follows_plans(product: &Product) -> bool {
     matches!(&product.configuration, Configuration::Filter(c) if c.is_assured())
 }
 
-/// The bytes of the memory of plans in `state`.
+/// The bytes of the plan state in `state`.
 fn plan(state: &State) -> Result<Vec<u8>, Failure> {
     match &state.block {
         BlockState::Filter { memory, .. } => postcard::to_stdvec(&memory.plan),
@@ -242,7 +242,7 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
     Ok(State { guid, mode, time, stop, stepped, last_step, fresh, configured, values, block })
 }
 
-/// The memory of plans that comes last. Whether it is one of this filter is found when it is restored.
+/// The plan state that comes last. Whether it is one of this filter is found when it is restored.
 fn read_plan(input: &mut Reader) -> Result<Commitment, Failure> {
     let length: u64 = input.field("length of the plan")?;
     if length != input.rest.len() as u64 {
@@ -366,7 +366,7 @@ impl Field for Phase {
     fn read(input: &mut Reader) -> Result<Self, Failure> {
         let number = u8::read(input)?;
         let known = Self::ALL.into_iter().find(|phase| *phase as u8 == number);
-        known.ok_or_else(|| format!("is {number}, which is no Phase"))
+        known.ok_or_else(|| format!("is {number}, which is not a Phase"))
     }
 }
 

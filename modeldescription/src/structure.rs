@@ -2,7 +2,7 @@
 //!
 //! Callers have value references, and give dependencies as such. The file wants the 1-based positions of the
 //! variables, ascending. A value reference is unique only within its base type. So the translation looks among
-//! the variables that may stand there ("knowns"), and refuses a value reference that fits more than one.
+//! the variables that may be there ("knowns"), and refuses a value reference that fits more than one.
 
 use crate::variable::variable_path;
 use crate::{Causality, Error, Initial, ModelDescription, Variability, Variable};
@@ -162,8 +162,8 @@ impl<'a> Knowns<'a> {
                 Some(positions) => {
                     let names: Vec<_> =
                         positions.iter().map(|p| format!("{:?}", self.variables[*p].name)).collect();
-                    let value = format!("{value_reference}, which stands for {}", names.join(" and "));
-                    return Err(Error::invalid(path, value, "value references that stand for one variable"));
+                    let value = format!("{value_reference}, which is that of {}", names.join(" and "));
+                    return Err(Error::invalid(path, value, "value references of exactly one variable"));
                 }
                 None => return Err(Error::invalid(path, value_reference, allowed)),
             }

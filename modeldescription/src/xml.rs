@@ -1,4 +1,4 @@
-//! The file `modelDescription.xml`. The model's own types say how each element is written. The rest stands here:
+//! The file `modelDescription.xml`. The model's own types say how each element is written. The rest is here:
 //! the root, the containers, and everything derived.
 //!
 //! Attributes at the default of the schema are left out, except causality, variability and initial: a reader of

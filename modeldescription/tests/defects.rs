@@ -163,7 +163,7 @@ defects! {
         r#"variables["y"].initial_dependencies is 3; allowed: value references of inputs, parameters, the independent variable or variables with initial exact"#,
         |d| d.variables[6].initial_dependencies = Some(vec![4, 3]);
     ambiguous_dependency:
-        r#"variables["y"].dependencies is 0, which stands for "rod.length" and "count" and "rearm" and "label"; allowed: value references that stand for one variable"#,
+        r#"variables["y"].dependencies is 0, which is that of "rod.length" and "count" and "rearm" and "label"; allowed: value references of exactly one variable"#,
         |d| d.variables[6].dependencies = Some(vec![0]);
     dependencies_of_an_input: r#"variables["u[1]"].dependencies is given; allowed: nothing, as this is neither an output nor, with model exchange, the derivative of a state"#,
         |d| d.variables[2].dependencies = Some(vec![]);

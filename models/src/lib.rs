@@ -31,7 +31,7 @@
 //!
 //! # How they are computed
 //!
-//! Trees become one tape on which each operation stands once (`tape`). The tape gives Taylor coefficient after
+//! Trees become one tape on which each operation occurs once (`tape`). The tape gives Taylor coefficient after
 //! Taylor coefficient of all its registers (`series`). So a step costs what its operations cost, and allocates
 //! nothing.
 //!

@@ -34,7 +34,7 @@ impl Model {
     /// # Errors
     ///
     /// No state or more than [`MAX_STATES`], no input or more than [`MAX_INPUTS`]; another number of derivatives
-    /// than of states; a parameter that is not finite. A name that is no identifier, stands twice or means
+    /// than of states; a parameter that is not finite. A name that is no identifier, occurs twice or means
     /// something else. In an expression: text that cannot be read, an unknown name, the time, a wrong number of
     /// arguments, an input that does not enter linearly.
     pub fn new(

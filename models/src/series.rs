@@ -2,7 +2,7 @@
 //!
 //! Coefficient k of a result needs the coefficients up to k of its operands. So a solution of ẋ = f(x) + g(x) u
 //! can be continued order by order, and each operation is done once for each order. Running a function on whole
-//! series would do it anew for every order of the solution. The recurrences are those of
+//! series would do it again for every order of the solution. The recurrences are those of
 //! [`Taylor`](punctual_core::jet::Taylor), whose tests are the reference for this module. The coefficients are
 //! numbers, or dual numbers along the inputs.
 //!

@@ -76,12 +76,12 @@ fn is_first_in_name(character: char) -> bool {
     character.is_ascii_alphabetic() || character == '_'
 }
 
-/// Whether `character` may stand in a name.
+/// Whether `character` may occur in a name.
 pub fn is_in_name(character: char) -> bool {
     character.is_ascii_alphanumeric() || character == '_'
 }
 
-/// Whether `name` stands in the text of an expression.
+/// Whether `name` occurs in the text of an expression.
 pub fn mentions(expression: &str, name: &str) -> bool {
     expression.split(|c| !is_in_name(c)).any(|word| word == name)
 }
@@ -114,7 +114,7 @@ pub(crate) enum Node {
     Call(String, Vec<Tree>),
 }
 
-/// An expression and the bytes of the text that it stands in.
+/// An expression and the bytes of the text that it is in.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Tree {
     pub(crate) node: Node,
@@ -153,7 +153,7 @@ const HABITS: [(&str, &str); 16] = [
     (">", "an expression has no comparison; a barrier is what is to be >= 0, as a - b for a >= b"),
     ("&", "both a >= 0 and b >= 0 is min(a, b), or two barriers"),
     ("|", "an absolute value is abs(x); a >= 0 or b >= 0 is max(a, b)"),
-    ("'", "a derivative has no sign of its own; name the state that it is"),
+    ("'", "a derivative has no symbol; name the state that equals it"),
     (".", "a name has no dots: sqrt, not np.sqrt"),
     ("[", "only ( and ) group"),
     ("{", "only ( and ) group"),
@@ -400,7 +400,7 @@ mod tests {
             ),
             ("x && y", "; both a >= 0 and b >= 0 is min(a, b), or two barriers"),
             ("|x|", "; an absolute value is abs(x); a >= 0 or b >= 0 is max(a, b)"),
-            ("x' + 1", "; a derivative has no sign of its own; name the state that it is"),
+            ("x' + 1", "; a derivative has no symbol; name the state that equals it"),
             ("np.sqrt(x)", "; a name has no dots: sqrt, not np.sqrt"),
             ("[x + 1]*2", "; only ( and ) group"),
             ("2x", "; a product is written with *"),

@@ -353,7 +353,7 @@ fn function(name: &str) -> Result<(Function, usize), String> {
     found.map(|f| (f.1, f.2)).ok_or_else(|| {
         let names = FUNCTIONS.map(|f| f.0);
         let all = names.join(", ");
-        format!("calls {name}, which is no function{}; the functions are {all}", nearest(name, &names))
+        format!("calls {name}, which is not a function{}; the functions are {all}", nearest(name, &names))
     })
 }
 

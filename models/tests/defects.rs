@@ -25,7 +25,7 @@ fn expressions() {
         ("sin", "names sin, a function, without arguments"),
         (
             "sine(v)",
-            "calls sine, which is no function (did you mean sin?); the functions are sqrt, exp, ln, ",
+            "calls sine, which is not a function (did you mean sin?); the functions are sqrt, exp, ln, ",
         ),
         ("atan2(v)", "gives 1 to atan2, which takes 2 arguments"),
         ("sin(v, p)", "gives 2 to sin, which takes 1 argument"),

@@ -4,7 +4,7 @@
   finds the plan from a start, `to_toml` writes a dict as a file has it.
 - `simulate` couples a filter FMU with a plant FMU in FMPy, `promise` judges a barrier there, `plot` draws it, `to_pandas`
   makes a frame of it.
-- In a dict a Python function may stand in the place of an expression: it is called once, with symbols.
+- In a dict a Python function may replace an expression: it is called once, with symbols.
 - `campaign` makes many runs from drawn starts, on this machine or on a Dask cluster.
 - `Filter` and `FilterBatch` are the same filter on NumPy arrays, without FMI. The module `punctual.gymnasium` wraps
   environments of Gymnasium with them.

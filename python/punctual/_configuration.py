@@ -38,7 +38,7 @@ def _plain(value: Any, path: str) -> Any:
     if isinstance(value, os.PathLike):
         return os.fspath(value)
     if callable(value):
-        raise TypeError(f"{path}: is {value!r}; a function may stand in the place of an expression only")
+        raise TypeError(f"{path}: is {value!r}; a function may replace only an expression")
     if not isinstance(value, (str, bool, int, float)):
         raise TypeError(f"{path}: is {value!r}, must be a number, text, truth value, list or dict")
     return value

@@ -29,7 +29,7 @@ class Status(IntEnum):
 
 
 class Assurance(IntEnum):
-    """Where the promise of a filter that follows plans stands."""
+    """Status of the guarantee of a filter that follows plans."""
 
     UNDECIDED = 0
     """No step with a valid state yet, or not armed."""
@@ -46,17 +46,17 @@ class Assurance(IntEnum):
 
 
 class Phase(IntEnum):
-    """Where a barrier stands with its promise."""
+    """Phase of a barrier's promise."""
 
     WAITING = 0
     """Not begun: no step with valid inputs yet, or not armed."""
     APPROACH = 1
-    """On the way, before the deadline."""
+    """Approaching, before the deadline."""
     LATE = 2
-    """The deadline passed outside; the approach goes on."""
+    """The deadline passed outside the set; the approach continues."""
     STAY = 3
     """Inside, and kept there."""
     LEFT = 4
     """Outside again; pulled back without a deadline."""
     RELEASED = 5
-    """Let go: nothing is asked any more."""
+    """Released: nothing is required any more."""

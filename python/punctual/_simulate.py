@@ -86,7 +86,7 @@ def _starts(slave: Slave, field: str, given: Mapping[str, float]) -> dict[str, f
     for name, value in given.items():
         full = next((full for full in (name, f"x0.{name}") if full in known), None)
         if full is None:
-            raise Error(f"{field}: {name!r} is no parameter or input of the {slave.name}, which has {', '.join(known)}")
+            raise Error(f"{field}: {name!r} is not a parameter or input of the {slave.name}, which has {', '.join(known)}")
         starts[full] = float(value)
     return starts
 
@@ -261,7 +261,7 @@ class _Pair:
         gives = self.plant.names("output", "Real")
         output = next((n for n in (source, f"x.{source}") if n in gives), None)
         if output is None:
-            raise Error(f"nominal.{name}: {source!r} is no output of the plant, which has {', '.join(gives)}")
+            raise Error(f"nominal.{name}: {source!r} is not an output of the plant, which has {', '.join(gives)}")
         # Converted, where the filter takes it in another unit.
         at = self.slots.get((self.own, output), self.slots[self.plant, output])
         return self.slots[self.own, full], at, float(factor), float(offset)

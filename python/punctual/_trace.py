@@ -44,7 +44,7 @@ class Symbol:
         if len(text) > LONGEST:
             raise Error(
                 f"an expression has {len(text)} characters at {_line()}, must have at most {LONGEST}; a part that is used"
-                " twice stands there twice"
+                " twice is written twice"
             )
         self.text, self.bond = text, bond
 

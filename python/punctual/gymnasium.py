@@ -165,8 +165,8 @@ class SafetyFilterVectorEnv(gymnasium.vector.VectorWrapper):
 
     The arguments are those of `SafetyFilterEnv`, with functions of all rows at once; `filter` is a configuration or a
     `FilterBatch` of `env.num_envs` rows, which is copied. The keys of `info` hold an array each, a row for each environment;
-    `filter_status` has the numbers of the statuses. A row whose episode is over starts anew with the next one, its time too,
-    whichever mode of automatic resets the environment has. A row that a step has only begun anew did no action: its keys are
+    `filter_status` has the numbers of the statuses. A row whose episode is over restarts with the next one, its time too,
+    whichever mode of automatic resets the environment has. A row that a step has only restarted did no action: its keys are
     masked (`_filter_action` and so on).
     """
 
@@ -222,7 +222,7 @@ class SafetyFilterVectorEnv(gymnasium.vector.VectorWrapper):
         over = terminated | truncated
         mode = self.env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP)
         begun = {AutoresetMode.NEXT_STEP: self._over, AutoresetMode.SAME_STEP: over}.get(mode)
-        # Rows that this step has begun anew in place of an action.
+        # Rows that this step has restarted instead of an action.
         done = ~self._over if mode == AutoresetMode.NEXT_STEP else np.ones(len(over), bool)
         self._steps += 1
         if begun is not None and begun.any():

@@ -80,7 +80,7 @@ impl FilterBatch {
         self.configuration.experiment.step_size
     }
 
-    /// Whether a plan in hand keeps the promise of each barrier whatever u_ref is, an array of bool of shape
+    /// Whether a backup plan keeps the promise of each barrier whatever u_ref is, an array of bool of shape
     /// (n, barriers). False before a row's first step, and from `rearm` or `reset` until its next.
     #[getter]
     fn guaranteed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<bool>>> {
@@ -175,7 +175,7 @@ impl FilterBatch {
         Ok((u, statuses.into_pyarray(py), h))
     }
 
-    /// Starts every deadline anew at the next step: of all loops, or of those where `rows`, an array of bool of
+    /// Restarts every deadline at the next step: of all loops, or of those where `rows`, an array of bool of
     /// shape (n,), is true.
     #[pyo3(signature = (rows=None))]
     fn rearm(&mut self, rows: Option<&Bound<'_, PyAny>>) -> PyResult<()> {

@@ -18,8 +18,8 @@ use crate::saved::{self, Reduced, Saved};
 /// same bits at the same times: those of the FMU are sums of its steps, so that `t += dt` has its bits, and `t = k * dt` may not.
 ///
 /// `configuration` is the path of a TOML file or a dict with the same content, of `kind = "filter"`. In a dict a function
-/// may stand in the place of an expression; it is called once, with symbols, and never in a step. A plug-in is loaded
-/// from the folder of the file (of a dict: from the current folder), without the trial in a process of its own that
+/// may replace an expression; it is called once, with symbols, and never in a step. A plug-in is loaded
+/// from the folder of the file (of a dict: from the current folder), without the trial in a separate process that
 /// `punctual.check` makes.
 ///
 /// Raises `punctual.Error` for a configuration that cannot be used, with the field, the value and what is allowed.
@@ -136,7 +136,7 @@ impl Filter {
         Plan::of(py, own.filter(), (self.seen.0, &self.seen.1), &self.configuration)
     }
 
-    /// Why there is no plan, where the promise was refused or withdrawn, or has come to its end.
+    /// Why there is no plan, where the promise was refused or lost, or has come to its end.
     #[getter]
     fn refusal(&mut self) -> Option<String> {
         let own = self.own.get_mut().unwrap_or_else(PoisonError::into_inner);
@@ -147,8 +147,8 @@ impl Filter {
         })
     }
 
-    /// Starts every deadline anew at the next step with a valid state, which decides anew on the promise. Where it finds no
-    /// other plan, the one at hand will do if it keeps that; until then it is followed.
+    /// Restarts every deadline at the next step with a valid state, which decides again on the promise. Where it finds no
+    /// other plan, the current one will do if it keeps that; until then it is followed.
     fn rearm(&mut self) {
         self.own.get_mut().unwrap_or_else(PoisonError::into_inner).rearm();
     }

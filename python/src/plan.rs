@@ -23,7 +23,7 @@ pub(crate) struct Plan {
     /// The barriers that it keeps: the place in the filter, the instant of the deadline if that is still to come.
     kept: Vec<(usize, Option<f64>)>,
     barriers: Signals,
-    /// Times on the way in s, shape (n,); the plant is at rest from the last on, or the plan ends there.
+    /// Times on the way in s, shape (n,); the plant is at an equilibrium from the last on, or the plan ends there.
     #[pyo3(get)]
     times: Py<PyArray1<f64>>,
     /// The states then, shape (n, states).
@@ -35,7 +35,7 @@ pub(crate) struct Plan {
     /// h of the barriers that it keeps, shape (n, barriers).
     #[pyo3(get)]
     h: Py<PyArray2<f64>>,
-    /// Time in s until which it keeps every promise: `inf` where it ends at rest.
+    /// Time in s until which it keeps every promise: `inf` where it ends at an equilibrium.
     #[pyo3(get)]
     until: f64,
     /// The largest input on the way after the first, as a part of its bounds, 0 to 1.
@@ -158,7 +158,7 @@ impl Plan {
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let times = self.times.bind(py).readonly();
         let end = times.as_slice()?.last().copied().unwrap_or(f64::NAN);
-        let ending = if self.until.is_finite() { "until" } else { "at rest from" };
+        let ending = if self.until.is_finite() { "until" } else { "at an equilibrium from" };
         Ok(format!("Plan({ending} t={end}, effort={})", self.effort))
     }
 }

@@ -29,7 +29,7 @@ pub(crate) struct BarrierReport {
     /// h now, in its own unit; not a number where the state is not.
     #[pyo3(get)]
     h: f64,
-    /// The lower bound on h that is promised now, in the unit of h.
+    /// The lower bound on h promised now, in the unit of h.
     #[pyo3(get)]
     profile: f64,
     /// Time to the deadline in s, 0 from the deadline on.
@@ -41,7 +41,7 @@ pub(crate) struct BarrierReport {
     /// Whether h >= 0 has been reached since the deadline began to count.
     #[pyo3(get)]
     arrived: bool,
-    /// Whether a plan in hand keeps the promise whatever u_ref is; where the filter follows plans.
+    /// Whether a backup plan keeps the promise, whatever u_ref is; only if the filter follows plans.
     #[pyo3(get)]
     guaranteed: bool,
     /// Whether the theorem behind the present phase applies so far.
@@ -141,7 +141,7 @@ impl Step {
         member(py, &STATUS, "Status", self.status as i32)
     }
 
-    /// Where the promise stands; `None` where no plans are followed.
+    /// Status of the guarantee; `None` where no plans are followed.
     #[getter]
     fn assurance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         self.standing.map(|standing| member(py, &ASSURANCE, "Assurance", standing as i32)).transpose()

@@ -69,7 +69,7 @@ impl Loop {
         self.filter.usual_hold(t).map_or(self.period, |usual| usual.max(self.longest))
     }
 
-    /// Starts every deadline anew; the integrated input stays.
+    /// Restarts every deadline; the integrated input stays.
     pub(crate) fn rearm(&mut self) {
         self.filter.rearm();
     }

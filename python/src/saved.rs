@@ -42,7 +42,7 @@ pub(crate) fn load(saved: Saved) -> PyResult<(FilterConfiguration, Vec<FilterSta
     let (version, text, folder, memories) = saved;
     if version != VERSION {
         let message = format!(
-            "version: the filter was pickled by punctual {version}, must be {VERSION}; make it anew from its configuration"
+            "version: the filter was pickled by punctual {version}, must be {VERSION}; create it again from its configuration"
         );
         return Err(refused(&message));
     }

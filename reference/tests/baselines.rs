@@ -167,11 +167,11 @@ fn settings_that_a_condition_would_replace_are_refused() {
     let method = Method::FirstOrder(Exponent::default());
     assert_eq!(
         build(BarrierSettings { method, ..settings }).unwrap(),
-        "line.method: a constraint of one's own takes the place of method and profile"
+        "line.method: a custom constraint replaces method and profile"
     );
     assert_eq!(
         build(BarrierSettings { recovery: Some(1.0), ..settings }).unwrap(),
-        "line.recovery: a constraint of one's own knows no recovery"
+        "line.recovery: a custom constraint has no recovery"
     );
     let none = Filter::builder(1, 1).condition(Chain::linear(&[1.0]).unwrap()).err();
     assert_eq!(none.unwrap().to_string(), "condition: there is no barrier yet to have it");

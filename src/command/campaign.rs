@@ -202,7 +202,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         if path.exists() && std::fs::read(path).map_or(true, |bytes| !bytes.starts_with(b"{\n  \"version\""))
         {
             let message =
-                format!("{} is there already and is no packed campaign; give another name", path.display());
+                format!("{} already exists and is not a packed campaign; give another name", path.display());
             return Err(Error::configuration("--pack", message));
         }
         let packed = campaign.packed()?;
@@ -270,7 +270,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     };
     // Tell.
     if progress.before > 0 {
-        output::note(&format!("note: {} of {all} runs were there already", progress.before));
+        output::note(&format!("note: {} of {all} runs already existed", progress.before));
     }
     if progress.again > 0 {
         output::note(&format!(

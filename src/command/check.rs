@@ -84,7 +84,7 @@ struct FilterReport {
     with_damping: Option<LoopReport>,
     /// The plan that keeps every promise whatever u_ref is, where every input has bounds.
     #[serde(skip_serializing_if = "Option::is_none")]
-    witness: Option<WitnessReport>,
+    backup_plan: Option<WitnessReport>,
     /// The starts that can be promised, where they were asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     map: Option<MapReport>,
@@ -103,7 +103,7 @@ struct BarrierReport {
     relative_degree: usize,
     /// Where inputs enter at different orders, so that only plans move them all: what was found.
     #[serde(skip_serializing_if = "Option::is_none")]
-    uneven: Option<String>,
+    mixed_degree: Option<String>,
     method: &'static str,
     /// In s; `null` for a barrier without one, that is to be kept.
     deadline: Option<f64>,
@@ -112,7 +112,7 @@ struct BarrierReport {
     rate_times_deadline: Option<f64>,
     /// In 1/s; `null` where it is chosen at the start.
     stay_rate: Option<f64>,
-    /// Whether the rate with which the set is kept is chosen anew at every sample; it is that of the first one then.
+    /// Whether the rate with which the set is kept is chosen again at every sample; it is that of the first one then.
     #[serde(skip)]
     chosen: bool,
     margin: f64,
@@ -127,7 +127,7 @@ struct StartReport {
     promised: bool,
     /// Whether the filter follows plans and has one that keeps this promise, whatever u_ref is.
     guaranteed: bool,
-    /// Time in s until which it does, where the plan ends without a rest.
+    /// Time in s until which it does, if the plan ends in motion.
     #[serde(skip_serializing_if = "Option::is_none")]
     guaranteed_until: Option<f64>,
     /// Whether the theorem applies to the first step.
@@ -336,7 +336,7 @@ fn start(arguments: &Arguments, configuration: &FilterConfiguration) -> Result<O
             part.split_once('=').ok_or_else(|| refuse(format!("is {part:?}, must be like {:?}", "v=1.5")))?;
         let Some(index) = names.iter().position(|n| n == name.trim()) else {
             return Err(refuse(format!(
-                "{:?} is no state, must be one of {}",
+                "{:?} is not a state, must be one of {}",
                 name.trim(),
                 names.join(", ")
             )));
@@ -372,15 +372,16 @@ fn filter(
     let damped =
         simulated.filter(|_| failed && matches!(wanted, Wanted::None) && closed_loop::has_damping(c));
     let with_damping = damped.map(|x0| closed_loop::watch(c, x0, &Wanted::Damping)).transpose()?;
-    let witness = simulated.map(|x0| witness::find(c, x0, closed_loop.as_ref(), out)).transpose()?.flatten();
+    let backup_plan =
+        simulated.map(|x0| witness::find(c, x0, closed_loop.as_ref(), out)).transpose()?.flatten();
     let (step, experiment) = (c.experiment.step_size, c.experiment);
     let mut warnings = Configuration::Filter(c.clone()).in_degrees();
     let runs_for = experiment.stop_time - experiment.start_time;
     if arm_after > 0.0 {
         let seconds = number(arm_after);
         warnings.push(format!(
-            "the filter is armed {seconds} s after its first step: until then nothing is promised; what is said of a start is said \
-             of the state then"
+            "the filter is armed {seconds} s after its first step: until then nothing is promised; statements about a start refer to \
+             the state at that time"
         ));
     }
     if arm_after >= runs_for {
@@ -445,7 +446,7 @@ fn filter(
         let report = begun.then(|| filter.report().barriers[i]);
         let reach = match (simulated, settings.deadline) {
             (Some(x0), Some(deadline)) if c.is_bounded() => {
-                let plans = witness.as_ref().filter(|_| c.is_assured());
+                let plans = backup_plan.as_ref().filter(|_| c.is_assured());
                 let plans = plans.map(|w| (w.keeps(name), w.soonest(name)));
                 let run = closed_loop.as_ref().filter(|run| !run.by_rows && c.run.simulated.is_none());
                 let arrival = run.and_then(|run| run.arrival(i, experiment.start_time));
@@ -454,7 +455,7 @@ fn filter(
             _ => None,
         };
         let simulated = closed_loop.as_ref().map(|run| run.barriers[i].promise);
-        let planned = witness.as_ref().filter(|witness| c.is_assured() && witness.covers(name));
+        let planned = backup_plan.as_ref().filter(|witness| c.is_assured() && witness.covers(name));
         let guaranteed = planned.is_some_and(|witness| witness.keeps(name));
         let start = report.map(|b| StartReport {
             h: b.h,
@@ -464,7 +465,7 @@ fn filter(
                 None => b.on_course && simulated.is_none_or(|seen| seen == Kept::Kept),
             },
             guaranteed,
-            guaranteed_until: witness.as_ref().filter(|_| guaranteed).and_then(WitnessReport::until),
+            guaranteed_until: backup_plan.as_ref().filter(|_| guaranteed).and_then(WitnessReport::until),
             on_course: b.on_course,
             simulated,
             reach,
@@ -489,7 +490,7 @@ fn filter(
             shape: section.shape.name(),
             unit,
             relative_degree: degrees[i],
-            uneven: uneven.map(|found| found.describe(|input| inputs[input].name.clone())),
+            mixed_degree: uneven.map(|found| found.describe(|input| inputs[input].name.clone())),
             method,
             deadline: settings.deadline,
             rate,
@@ -513,7 +514,7 @@ fn filter(
         warnings,
         closed_loop,
         with_damping,
-        witness,
+        backup_plan,
         map: None,
         effort: None,
     })
@@ -575,7 +576,7 @@ fn in_vain(c: &FilterConfiguration) -> Vec<String> {
     let pairs = c.apart().into_iter().filter(|pair| pair.iter().all(is_kept));
     pairs
         .filter_map(|pair| c.apart_in_words(pair))
-        .map(|words| format!("{words}, and neither is ever let go"))
+        .map(|words| format!("{words}, and neither is ever released"))
         .collect()
 }
 
@@ -696,9 +697,7 @@ fn filter_text(report: &FilterReport) -> String {
             start.iter().map(|(name, value)| format!("{name} = {}", number(*value))).collect();
         lines.push(format!("start: {}", state.join(", ")));
     } else {
-        lines.push(
-            "start: none; with `x0` in the file or --x0 closed loop and plans are looked at".to_owned(),
-        );
+        lines.push("start: none; give `x0` in the file or --x0 to examine closed loop and plans".to_owned());
     }
     if let Some(status) = &report.status {
         lines.push(format!("first step with u_ref = 0: {status}"));
@@ -729,7 +728,7 @@ fn filter_text(report: &FilterReport) -> String {
             ("stay rate", stay_rate),
             ("margin", output::quantity(b.margin, &b.unit)),
         ];
-        if let Some(found) = &b.uneven {
+        if let Some(found) = &b.mixed_degree {
             let found = found.strip_prefix("is ").unwrap_or(found);
             rows.insert(1, ("", format!("{found}; the row moves what enters first, plans every input")));
         }
@@ -746,7 +745,7 @@ fn filter_text(report: &FilterReport) -> String {
     if let Some(run) = &report.with_damping {
         lines.push(run.head());
     }
-    lines.extend(report.witness.iter().map(WitnessReport::text));
+    lines.extend(report.backup_plan.iter().map(WitnessReport::text));
     if let Some(map) = &report.map {
         let files = map.files.join("\n         ");
         lines.push(format!("\n{} of {} starts can be promised\nwritten: {files}", map.promised, map.of));

@@ -1,5 +1,5 @@
 //! Closed loops of `check`, on the filter's own model and with the wanted u_ref. They tell whether each promise
-//! is kept, the soonest deadline, and the smallest bounds.
+//! is kept, the earliest deadline, and the smallest bounds.
 
 use std::cell::RefCell;
 
@@ -20,7 +20,7 @@ use crate::output::{self, number, number_above, number_below};
 
 /// Most samples until a deadline; fewer where the filter's own step is longer.
 const SAMPLES: f64 = 200.0;
-/// Relative tolerance of the soonest deadline.
+/// Relative tolerance of the earliest deadline.
 const TOLERANCE: f64 = 0.02;
 /// The longest deadline looked for, in units of the configured one.
 const HORIZON: f64 = 30.0;
@@ -79,7 +79,7 @@ impl Wanted {
             };
             let Some(index) = inputs.iter().position(|input| input == name.trim()) else {
                 return refuse(format!(
-                    "{:?} is no input, must be one of {}",
+                    "{:?} is not an input, must be one of {}",
                     name.trim(),
                     inputs.join(", ")
                 ));
@@ -349,12 +349,12 @@ pub(super) enum Verdict {
 pub(super) struct ReachReport {
     pub(super) deadline: Verdict,
     /// Least time in s that any input within the bounds needs.
-    soonest_at_least: Option<f64>,
-    /// The soonest deadline that this filter meets in simulation, or a plan in the model, in s.
-    soonest_at_most: Option<f64>,
+    earliest_at_least: Option<f64>,
+    /// The earliest deadline that this filter meets in simulation, or a plan in the model, in s.
+    earliest_at_most: Option<f64>,
     /// Whether it is a plan that meets the deadline.
     by_plan: bool,
-    /// Whether it is the closed loop that meets the soonest one.
+    /// Whether it is the closed loop that meets the earliest one.
     #[serde(skip)]
     by_loop: bool,
 }
@@ -367,17 +367,17 @@ impl ReachReport {
             Verdict::CannotBeMet => "cannot be met (no input within the bounds is inside then)",
             Verdict::NotKnown => "not known whether it can be met",
         };
-        let least = match self.soonest_at_least {
+        let least = match self.earliest_at_least {
             Some(time) => format!("at least {} s (no input within the bounds is faster)", number_below(time)),
             None => "no lower bound is known".to_owned(),
         };
         let is_planned = self.by_plan && !self.by_loop;
         let who = if is_planned { "a plan does it" } else { "this filter does it, simulated" };
-        let most = match self.soonest_at_most {
+        let most = match self.earliest_at_most {
             Some(time) => format!("at most {} s ({who})", number_above(time)),
             None => "no upper bound was found".to_owned(),
         };
-        vec![("bounds", verdict.to_owned()), ("soonest", least), ("", most)]
+        vec![("bounds", verdict.to_owned()), ("earliest", least), ("", most)]
     }
 }
 
@@ -423,7 +423,8 @@ fn deadlines(c: &FilterConfiguration) -> Vec<f64> {
 }
 
 /// Limits that the bounds set to barrier `index`, of that deadline, from `x0`. `plans`: where they are followed, whether there
-/// is one for this deadline, and the soonest for which there is. `arrival`: when the closed loop that keeps everything is there.
+/// is one for this deadline, and the earliest for which there is. `arrival`: when the closed loop that keeps everything is
+/// there.
 pub(super) fn reach(
     c: &FilterConfiguration,
     (index, deadline): (usize, f64),
@@ -441,17 +442,17 @@ pub(super) fn reach(
     let horizon = HORIZON * deadline;
     let soonest = filter.earliest_arrival(index, t, x0, horizon).map_err(Error::from)?;
     let lost = filter.is_ruled_out(index, t, x0, deadline).map_err(Error::from)?;
-    if let Some((found, soonest_at_most)) = plans {
+    if let Some((found, earliest_at_most)) = plans {
         let deadline = match () {
             () if found => Verdict::CanBeMet,
             () if lost => Verdict::CannotBeMet,
             () => Verdict::NotKnown,
         };
-        let (soonest_at_most, by_loop) = sooner(soonest_at_most);
+        let (earliest_at_most, by_loop) = sooner(earliest_at_most);
         return Ok(ReachReport {
             deadline,
-            soonest_at_least: soonest,
-            soonest_at_most,
+            earliest_at_least: soonest,
+            earliest_at_most,
             by_plan: true,
             by_loop,
         });
@@ -487,8 +488,8 @@ pub(super) fn reach(
     let (most, by_loop) = sooner(most);
     Ok(ReachReport {
         deadline: verdict,
-        soonest_at_least: soonest,
-        soonest_at_most: most,
+        earliest_at_least: soonest,
+        earliest_at_most: most,
         by_plan: false,
         by_loop,
     })

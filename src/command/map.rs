@@ -58,7 +58,7 @@ impl Plane {
             let names: Vec<_> = states.iter().map(|s| s.name.as_str()).collect();
             let state = names.iter().position(|n| *n == name);
             let state = state.ok_or_else(|| {
-                refuse(format!("{name:?} is no state, must be one of {}", names.join(", ")))
+                refuse(format!("{name:?} is not a state, must be one of {}", names.join(", ")))
             })?;
             Ok((state, [low, high]))
         };
@@ -86,7 +86,7 @@ pub(super) fn starts(
     };
     let mut kinds = vec!["can be promised".to_owned()];
     kinds.extend(c.barrier.iter().map(|barrier| format!("no plan keeps {}", barrier.name)));
-    kinds.extend(["no plan comes to rest", "nothing to promise"].map(str::to_owned));
+    kinds.extend(["no plan reaches an equilibrium", "nothing to promise"].map(str::to_owned));
     let others = c.barrier.len() + 1;
     let kind = |planning: Planning<'_>, x: &[f64]| {
         // Outside of a set without a deadline nothing can be promised of it.

@@ -72,7 +72,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
 }
 
 fn there(path: &Path) -> Error {
-    let message = format!("{} is there already; name another file, or remove that one", path.display());
+    let message = format!("{} already exists; name another file, or remove that one", path.display());
     Error::configuration("FILE", message)
 }
 

@@ -46,7 +46,7 @@ pub struct Arguments {
     /// Print JSON instead of text
     #[arg(long)]
     json: bool,
-    /// Run in a process of its own: report a crash of an FMU, and keep the rows until then
+    /// Run in a separate process: report a crash of an FMU, and keep the rows until then
     #[arg(long)]
     isolate: bool,
     /// List the signals too: unit, least, greatest and final value

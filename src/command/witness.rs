@@ -1,4 +1,4 @@
-//! The witness of `check`: whether a plan within the bounds keeps every promise, whatever u_ref is.
+//! The backup plan of `check`: whether one within the bounds keeps every promise, whatever u_ref is.
 
 use std::path::Path;
 
@@ -23,8 +23,8 @@ pub(super) struct WitnessReport {
     /// What no plan accounts for yet, or what the nearest one fails at.
     #[serde(skip_serializing_if = "Option::is_none")]
     reason: Option<String>,
-    /// Where none ends at rest, a `plan_horizon` in s with which there is one, and the time in s until which that keeps every
-    /// promise.
+    /// Where none ends at an equilibrium, a `plan_horizon` in s with which there is one, and the time in s until which that
+    /// keeps every promise.
     #[serde(skip_serializing_if = "Option::is_none")]
     in_motion: Option<[f64; 2]>,
     /// Barriers that are not promised from there: soft, outside without a deadline, or let go before it.
@@ -33,10 +33,10 @@ pub(super) struct WitnessReport {
     #[serde(skip)]
     has_deadline: bool,
     /// The least factor of all deadlines with which a plan was found.
-    soonest_factor: Option<f64>,
-    /// The soonest deadlines in s, by barrier.
-    soonest: Vec<(String, f64)>,
-    /// The plan with the configured deadlines, or else with the soonest.
+    earliest_factor: Option<f64>,
+    /// The earliest deadlines in s, by barrier.
+    earliest: Vec<(String, f64)>,
+    /// The plan with the configured deadlines, or else with the earliest.
     plan: Option<PlanReport>,
     /// Pictures of it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -46,9 +46,9 @@ pub(super) struct WitnessReport {
 /// A plan that was checked.
 #[derive(Serialize)]
 struct PlanReport {
-    /// Time in s from which the plant is at rest, where the plan ends so.
-    rest: Option<f64>,
-    /// Time in s until which it keeps every promise, where it ends without a rest.
+    /// Time in s from which the plant is at an equilibrium, if the plan ends at one.
+    at_equilibrium_from: Option<f64>,
+    /// Time in s until which it keeps every promise, if it ends in motion.
     until: Option<f64>,
     /// The largest size of each input, with its unit and bounds.
     inputs: Vec<(String, f64, String, [f64; 2])>,
@@ -76,8 +76,8 @@ pub(super) fn find(
         in_motion: in_motion(c, x0),
         left_out: Vec::new(),
         has_deadline: false,
-        soonest_factor: None,
-        soonest: Vec::new(),
+        earliest_factor: None,
+        earliest: Vec::new(),
         plan: None,
         files: Vec::new(),
     };
@@ -89,7 +89,10 @@ pub(super) fn find(
     let t = c.experiment.start_time;
     let unit = |i: usize| c.barrier[i].unit(&c.plant);
     let plan = |witness: &Witness| PlanReport {
-        rest: witness.until.is_infinite().then(|| witness.inputs.last().map_or(t, |(end, _)| *end)),
+        at_equilibrium_from: witness
+            .until
+            .is_infinite()
+            .then(|| witness.inputs.last().map_or(t, |(end, _)| *end)),
         until: Some(witness.until).filter(|until| until.is_finite()),
         inputs: inputs
             .iter()
@@ -112,7 +115,7 @@ pub(super) fn find(
     let left_out = c.barrier.iter().zip(planning.promised(t, x0)).filter(|(_, promised)| !promised);
     let left_out = left_out.map(|(barrier, _)| barrier.name.clone()).collect();
     let reason = configured.as_ref().err().map(|failure| c.refusal(*failure));
-    // Where the closed loop followed plans in the model, its inputs and the plan in hand then are one as well.
+    // Where the closed loop followed plans in the model, its inputs and the backup plan then are one as well.
     let run = run.filter(|run| !run.by_rows && c.run.simulated.is_none());
     let deadlines = |factor: f64| {
         let given = c.barrier.iter().enumerate().filter_map(|(i, b)| {
@@ -133,14 +136,14 @@ pub(super) fn find(
         in_motion: if configured.is_err() { in_motion(c, x0) } else { None },
         left_out,
         has_deadline,
-        soonest_factor: soonest.as_ref().map(|(factor, _)| *factor),
-        soonest: soonest.as_ref().map_or(Vec::new(), |(factor, _)| deadlines(*factor)),
+        earliest_factor: soonest.as_ref().map(|(factor, _)| *factor),
+        earliest: soonest.as_ref().map_or(Vec::new(), |(factor, _)| deadlines(*factor)),
         plan: shown.map(plan),
         files,
     }))
 }
 
-/// The soonest deadlines with a plan from `x0`, for a promise that was refused, in a line.
+/// The earliest deadlines with a plan from `x0`, for a promise that was refused, in a line.
 pub(super) fn in_time(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<String>, Error> {
     let has_deadline = c.barrier.iter().any(|barrier| barrier.deadline.is_some());
     let filter = c.assured(c.build()?).ok().filter(|_| has_deadline);
@@ -150,7 +153,7 @@ pub(super) fn in_time(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<Stri
         Some((factor, _)) => {
             let soonest = c.barrier.iter().filter_map(|b| Some((&b.name, factor * b.deadline?)));
             let named: Vec<_> = soonest.map(|(name, at)| format!("{name} {} s", number(at))).collect();
-            format!("soonest deadline with a plan: {}", named.join(", "))
+            format!("earliest deadline with a plan: {}", named.join(", "))
         }
         None if matches!(planning.plan_from(t, x0, 1.0), Err(Failure::Apart { .. })) => return Ok(None),
         None => {
@@ -185,32 +188,32 @@ impl WitnessReport {
         self.left_out.iter().all(|name| name != barrier)
     }
 
-    /// Time in s until which the plan keeps what it does, where it ends without a rest.
+    /// Time in s until which the plan keeps what it does, if it ends in motion.
     pub(super) fn until(&self) -> Option<f64> {
         self.plan.as_ref()?.until
     }
 
-    /// The soonest deadline of `barrier` in s with a plan.
+    /// The earliest deadline of `barrier` in s with a plan.
     pub(super) fn soonest(&self, barrier: &str) -> Option<f64> {
-        self.soonest.iter().find(|(name, _)| name == barrier).map(|(_, deadline)| *deadline)
+        self.earliest.iter().find(|(name, _)| name == barrier).map(|(_, deadline)| *deadline)
     }
 
     pub(super) fn text(&self) -> String {
         let mut lines = vec![match (self.found, &self.reason) {
             (true, _) => {
                 let until = self.until().map(|until| {
-                    format!(", until {} s; it is prolonged where one is found", number_below(until))
+                    format!(", until {} s; it is extended if a longer one is found", number_below(until))
                 });
-                let keeps = "a plan within the bounds keeps every promise, whatever u_ref is";
-                format!("\nwitness: {keeps}{}", until.unwrap_or_default())
+                let keeps = "found; within the bounds, it keeps every promise, whatever u_ref is";
+                format!("\nbackup plan: {keeps}{}", until.unwrap_or_default())
             }
-            (false, Some(reason)) if self.vain => format!("\nwitness: there can be NONE: {reason}"),
-            (false, Some(reason)) => format!("\nwitness: NONE was found: {reason}"),
-            (false, None) => "\nwitness: NONE was found".to_owned(),
+            (false, Some(reason)) if self.vain => format!("\nbackup plan: NONE can exist: {reason}"),
+            (false, Some(reason)) => format!("\nbackup plan: NONE was found: {reason}"),
+            (false, None) => "\nbackup plan: NONE was found".to_owned(),
         }];
         if let Some([horizon, until]) = self.in_motion {
             lines.push(format!(
-                "none ends at rest; with plan_horizon = {} there is one until {} s, to be prolonged on the way",
+                "none ends at an equilibrium; with plan_horizon = {} there is one until {} s, to be extended during the run",
                 number(horizon),
                 number_below(until)
             ));
@@ -219,12 +222,12 @@ impl WitnessReport {
             lines.push(format!("not promised from there, and not in the plan: {}", self.left_out.join(", ")));
         }
         let soonest: Vec<_> = self
-            .soonest
+            .earliest
             .iter()
             .map(|(name, deadline)| format!("{name} {} s", number_above(*deadline)))
             .collect();
         if !soonest.is_empty() {
-            lines.push(format!("soonest deadline with a plan: {}", soonest.join(", ")));
+            lines.push(format!("earliest deadline with a plan: {}", soonest.join(", ")));
         } else if self.has_deadline && !self.found && !self.vain && self.plan.is_none() {
             lines.push(format!("none was found for deadlines up to {} times as long either", Plans::LONGEST));
         }
@@ -238,16 +241,16 @@ impl WitnessReport {
                 })
                 .collect();
             let of = if self.found { "the plan" } else { "the plan for that" };
-            let ending = match (plan.rest, plan.until) {
-                (Some(rest), _) => format!("at rest from {} s", number(rest)),
+            let ending = match (plan.at_equilibrium_from, plan.until) {
+                (Some(from), _) => format!("at an equilibrium from {} s", number(from)),
                 (None, until) => {
-                    format!("until {} s, without a rest", number_below(until.unwrap_or(f64::NAN)))
+                    format!("until {} s, ending in motion", number_below(until.unwrap_or(f64::NAN)))
                 }
             };
             lines.push(format!("{of}: {ending}; {}", inputs.join(", ")));
             if let Some((barrier, time, slack, unit)) = &plan.tightest {
                 let (slack, time) = (output::quantity(*slack, unit), number(*time));
-                lines.push(format!("its tightest place: {barrier} at {time} s, {slack} inside"));
+                lines.push(format!("its tightest point: {barrier} at {time} s, {slack} inside"));
             }
         }
         if !self.files.is_empty() {

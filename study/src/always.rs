@@ -378,7 +378,7 @@ pub(super) fn table(options: &Options, watch: &Watch) -> Result<(Table, bool), E
         "Bounds: |u_i| ≤ {BOUND} m/s² (m/s for the moved point), |ω| ≤ {TURN} rad/s, |β| ≤ {TURN} rad. T = {DEADLINE} s, \
          to {END} s, step {PERIOD} s (the tube {FINE} s). Outwards: {PUSH} m/s² (m/s) away from the disc."
     ))
-    .note("Reach and stay: the first of the hundred starts, margin 0.02 m. Stay: random starts inside from which a brake stays inside.")
+    .note("Reach and stay: the first of the hundred starts, margin 0.02 m. Stay: random starts inside from which braking stays inside.")
     .note("Accepted: promised at the first sample. Rows: their conditions held there, which promises nothing. Plans: assured. Tube: T is no shorter than its least deadline.")
     .note("gatekeeper and backup CBF brake as their backup; accepted where it stays inside. They cannot be asked to reach a set, or to be on time.")
     .note("Changed: the input is not u_ref within its bounds, by more than a millionth of them. Mean change: |u_i − u_ref,i| over its bound, over all inputs, steps and runs.");

@@ -481,7 +481,7 @@ fn steps(options: &Options) -> Result<(Vec<Figure>, Table), Error> {
             "lateness against the sampling period",
             "arrival − T (s)",
             late,
-            "One run each from rest at the origin, T = 10 s. What is not drawn is not late. The orders stand in the table of the sampling period.".into(),
+            "One run each from rest at the origin, T = 10 s. What is not drawn is not late. The orders are in the table of the sampling period.".into(),
         ),
         figure(
             "shortfall",

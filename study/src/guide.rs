@@ -27,7 +27,7 @@ const PICTURES: [&str; 11] = [
     "always-stay",
 ];
 
-/// Makes the pictures in `folder`/guide anew, and the tables of `folder`/guide.md. Each table stands between a
+/// Makes the pictures in `folder`/guide again, and the tables of `folder`/guide.md. Each table is between a
 /// line `<!-- table KEY -->` and a line `<!-- end -->`.
 ///
 /// # Errors

@@ -181,7 +181,7 @@ fn plans_are_decided_on_at_the_armed_step() {
         if k < 3 {
             assert_eq!([slave.real("u.u_x"), slave.real("u.u_y")], [8.0, 0.0]);
         }
-        // It stands still although it was told to move, so the promise is withdrawn in the end; not before it was given.
+        // It stands still although it was told to move, so the guarantee is withdrawn in the end; not before it was given.
         if wanted == Standing::Assured {
             break;
         }

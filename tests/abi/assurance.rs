@@ -208,7 +208,7 @@ fn what_is_not_promised_is_said_in_words() {
     // Once, not at every step.
     let [message] = &slave.log.messages()[..] else { panic!("{:?}", slave.log.messages()) };
     assert!(
-        message.starts_with("the promise is refused (") && message.contains("goal is not met at 2 s"),
+        message.starts_with("the guarantee is refused (") && message.contains("goal is not met at 2 s"),
         "{message}"
     );
     assert_eq!(slave.log.entries()[0].category, "logStatusWarning");
@@ -219,7 +219,11 @@ fn what_is_not_promised_is_said_in_words() {
     sample(&slave, [-300.0, 0.0, 0.0, 0.0]);
     slave.step(3.0 * STEP, STEP);
     assert_eq!(slave.integer("assurance"), Standing::Withdrawn as i32);
-    assert!(slave.log.messages()[0].starts_with("the promise is withdrawn ("), "{:?}", slave.log.messages());
+    assert!(
+        slave.log.messages()[0].starts_with("the guarantee is withdrawn ("),
+        "{:?}",
+        slave.log.messages()
+    );
     // Back again, it is given again, which is said once too.
     for k in 4..6 {
         sample(&slave, [0.0, 0.0, 1.0, 0.0]);
@@ -227,7 +231,7 @@ fn what_is_not_promised_is_said_in_words() {
         assert_eq!(slave.integer("assurance"), Standing::Assured as i32);
     }
     let said = slave.log.messages();
-    assert!(said.len() == 2 && said[1].starts_with("the promise is assured again"), "{said:?}");
+    assert!(said.len() == 2 && said[1].starts_with("the guarantee is regained"), "{said:?}");
     // What is read ahead of the step that decides anew is what the step says.
     slave.set_flag("rearm", true);
     sample(&slave, [0.0, 0.0, 1.0, 0.0]);
@@ -262,7 +266,7 @@ fn parameters_that_no_plan_accounts_for() {
         assert_eq!(slave.integer("assurance"), standing as i32);
         assert_eq!(slave.flag("goal.guaranteed"), v == 0.0);
         let said = slave.log.messages().concat();
-        let why = "the promise is refused (no plan was found at the start: nothing is promised): measurement_errors.v is 0.01, must be 0 for a plan";
+        let why = "the guarantee is refused (no plan was found at the start: nothing is promised): measurement_errors.v is 0.01, must be 0 for a plan";
         assert!(if v == 0.0 { said.is_empty() } else { said.starts_with(why) }, "{said}");
         // Back to where it was.
         let state = slave.state();

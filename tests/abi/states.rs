@@ -173,7 +173,7 @@ fn states_that_are_none() {
         let (mut kept, mut size, mut room) = (bad, 7, [0; 4096]);
         let none = |status| {
             let message = slave.refused(status);
-            assert!(message.contains(": FMUstate is none that fmi2GetFMUstate"), "{message}");
+            assert!(message.contains(": FMUstate was not returned by fmi2GetFMUstate"), "{message}");
         };
         none((API.get_state)(c, &raw mut kept));
         none((API.set_state)(c, bad));

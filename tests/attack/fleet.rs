@@ -41,7 +41,7 @@ radius = 2.0
 deadline = 5.0
 after = "first"
 profile = "low_peak"
-when_infeasible = "soonest"
+when_infeasible = "earliest"
 [[barrier]]
 name = "rock"
 shape = "obstacle"

@@ -68,7 +68,7 @@ fn a_new_file_is_checked_and_run_and_keeps_its_promise() {
         assert_eq!(done.success(), "written: my.toml\n");
         let checked = workshop.punctual(["check", "my.toml"]).success();
         assert!(checked.contains("with the u_ref of the file"), "{checked}");
-        assert!(checked.contains("\nwitness: a plan"), "{checked}");
+        assert!(checked.contains("\nbackup plan: found"), "{checked}");
         let ran = workshop.punctual(["run", "my.toml", "--require", "kept"]).success();
         assert!(ran.contains("written: my/my.csv"), "{ran}");
         let inputs = if model == "unicycle" { &["u-a", "u-omega", "path"][..] } else { &["u-F", "h-2"] };
@@ -79,7 +79,7 @@ fn a_new_file_is_checked_and_run_and_keeps_its_promise() {
         workshop.punctual(["build", "my.toml", "-o", "my.fmu"]).success();
         workshop
             .punctual(["new", "my.toml"])
-            .fails(2, "FILE: my.toml is there already; name another file, or remove that one");
+            .fails(2, "FILE: my.toml already exists; name another file, or remove that one");
     }
     Workshop::new().punctual(["new", "my.fmu"]).fails(2, "FILE: is \"my.fmu\", must end in .toml");
 }
@@ -319,7 +319,7 @@ fn a_file_alone_is_its_filter_and_plant_coupled() {
     // An FMU that is not made of the file beside it.
     workshop.write("plant.toml", workshop.text("plant.toml").replace("v = 1.0", "v = 2.0"));
     let done = workshop.punctual(["run", "fmus.toml"]);
-    let stale = "note: plant.fmu is not made of plant.toml as that is now; build it anew, or name the .toml file in the system\n";
+    let stale = "note: plant.fmu was not built from the current plant.toml; rebuild it, or name the .toml file in the system\n";
     assert!(done.stderr.contains(stale), "{}", done.stderr);
 }
 
@@ -466,7 +466,7 @@ fn an_aeroplane_that_cannot_stop_is_promised_to_loiter() {
         "{checked}"
     );
     assert!(
-        checked.contains("whatever u_ref is, until 60.8 s; it is prolonged where one is found"),
+        checked.contains("whatever u_ref is, until 60.8 s; it is extended if a longer one is found"),
         "{checked}"
     );
     workshop.punctual(["run", "plane.toml", "--require", "on_time_and_inside"]).success();
@@ -476,9 +476,9 @@ fn an_aeroplane_that_cannot_stop_is_promised_to_loiter() {
     // Without a horizon it says what to do; where no plans are followed, that there is none to prolong.
     workshop.write("plane.toml", file.replace("plan_horizon = 20.0", ""));
     let refused = workshop.punctual(["check", "plane.toml"]);
-    assert!(refused.code == 1 && refused.stdout.contains("witness: NONE was found"), "{refused:#?}");
+    assert!(refused.code == 1 && refused.stdout.contains("backup plan: NONE was found"), "{refused:#?}");
     assert!(
-        refused.stdout.contains("none ends at rest; with plan_horizon = 30 there is one until "),
+        refused.stdout.contains("none ends at an equilibrium; with plan_horizon = 30 there is one until "),
         "{refused:#?}"
     );
     for (value, message) in [

@@ -120,8 +120,8 @@ fn twins_are_recorded_where_they_are_named() {
 fn check_says_what_it_leaves_open() {
     let workshop = workshop("none", "gauss-seidel", "arm_after = 0.25\n");
     let done = workshop.punctual(["check", "filter.toml", "--x0", "p=38.5"]);
-    let warning = "warning: the filter is armed 0.25 s after its first step: until then nothing is promised; what is said of a start is \
-                   said of the state then";
+    let warning = "warning: the filter is armed 0.25 s after its first step: until then nothing is promised; statements about a start \
+                   refer to the state at that time";
     assert!(done.stdout.contains(warning), "{done:#?}");
     let late = self::workshop("none", "gauss-seidel", "arm_after = 25.0\n");
     let done = late.punctual(["check", "filter.toml"]);

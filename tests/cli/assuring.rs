@@ -54,7 +54,10 @@ fn a_promise_is_kept_whatever_is_wanted() {
             (&true.into(), &true.into())
         );
     }
-    assert_eq!((&report["witness"]["found"], &report["closed_loop"]["kept"]), (&true.into(), &true.into()));
+    assert_eq!(
+        (&report["backup_plan"]["found"], &report["closed_loop"]["kept"]),
+        (&true.into(), &true.into())
+    );
     let text = workshop.punctual(&check[..4]).success();
     assert!(text.contains("; guaranteed, whatever u_ref is\n"), "{text}");
     let run =
@@ -76,14 +79,14 @@ fn what_cannot_be_promised_is_refused() {
     let done = workshop.punctual(["check", "filter.toml", "--plant", "plant.toml"]);
     assert_eq!(done.code, 1, "{done:#?}");
     assert!(
-        done.stdout.contains("witness: NONE was found: by the nearest way tried, goal is not met at 2.5"),
+        done.stdout.contains("backup plan: NONE was found: in the closest attempt, goal is not met at 2.5"),
         "{}",
         done.stdout
     );
-    assert!(done.stdout.contains("soonest deadline with a plan: goal 3."), "{}", done.stdout);
+    assert!(done.stdout.contains("earliest deadline with a plan: goal 3."), "{}", done.stdout);
     let run = workshop.punctual(["run", "system.toml", "--out", "out"]);
     let told = format!("{}{}", run.stdout, run.stderr);
-    assert!(told.contains("the promise is refused") && told.contains("goal is not met at 2.5"), "{told}");
+    assert!(told.contains("the guarantee is refused") && told.contains("goal is not met at 2.5"), "{told}");
 }
 
 /// What no plan accounts for is an error that names it.
@@ -106,7 +109,7 @@ fn what_no_plan_accounts_for_is_an_error() {
     workshop.punctual(["check", "filter.toml"]).fails_like(
         2,
         "filter.toml: assurance: is \"on\", must be \"off\": a barrier follows ",
-        &["which others move and no plan foresees"],
+        &["which is moved from outside, so that no plan can predict it"],
     );
 }
 
@@ -192,7 +195,7 @@ fn starts_that_can_be_promised_are_drawn() {
     }
     for (ranges, message) in [
         ("x_p=0..1", "is \"x_p=0..1\", must be two states, like \"x_p=-5..25,y_p=-5..15\""),
-        ("x_p=0..1,z=0..1", "\"z\" is no state, must be one of x_p, y_p, theta, v"),
+        ("x_p=0..1,z=0..1", "\"z\" is not a state, must be one of x_p, y_p, theta, v"),
         ("x_p=1..0,y_p=0..1", "has \"x_p=1..0\", must go from less to more"),
         ("x_p=0..nan,y_p=0..1", "has \"x_p=0..nan\", must be like \"x_p=-5..25\""),
     ] {

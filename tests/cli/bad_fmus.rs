@@ -101,7 +101,7 @@ fn another_version_of_fmi() {
     let done = run(description("fmiVersion=\"2.0\"", "fmiVersion=\"1.0\""));
     done.fails(
         1,
-        "plant (plant.fmu): cannot be run here: it is of FMI 1.0, and this program is for FMI 2.0 and 3.0; export it anew as \
+        "plant (plant.fmu): cannot be run here: it is of FMI 1.0, and this program is for FMI 2.0 and 3.0; export it again as \
          one of these",
     );
 }

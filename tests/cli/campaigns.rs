@@ -234,7 +234,7 @@ fn a_campaign_can_be_ended_at_any_point() {
     workshop.write("c.toml", file(MANY, "random"));
 
     let resumed = workshop.punctual(["campaign", "c.toml", "-o", "cut.parquet", "--json"]);
-    assert_eq!(resumed.stderr, format!("note: {before} of {MANY} runs were there already\n"));
+    assert_eq!(resumed.stderr, format!("note: {before} of {MANY} runs already existed\n"));
     let report: Value = serde_json::from_str(&resumed.success()).expect("JSON");
     assert!(!workshop.path(folder).exists());
     workshop.punctual(["campaign", "c.toml", "-o", "whole.parquet", "--threads", "1"]).success();
@@ -310,7 +310,7 @@ fn what_is_damaged_among_the_rows_kept_is_made_again() {
     let made = resumed();
     assert_eq!(
         made.stderr,
-        "note: 8 of 20 runs were there already\nnote: the kept rows of 7 runs were damaged; these were made again\n"
+        "note: 8 of 20 runs already existed\nnote: the kept rows of 7 runs were damaged; these were made again\n"
     );
     made.success();
     is_whole();
@@ -320,7 +320,7 @@ fn what_is_damaged_among_the_rows_kept_is_made_again() {
     let twice = segment(7, 9);
     resumed().fails_like(2, &format!("cannot use {twice}: "), &["its runs 7..9 are there twice"]);
     fs::remove_file(workshop.path(&twice)).expect("a file");
-    assert_eq!(resumed().stderr, "note: 5 of 20 runs were there already\n");
+    assert_eq!(resumed().stderr, "note: 5 of 20 runs already existed\n");
     is_whole();
 }
 
@@ -406,7 +406,7 @@ fn each_defect_is_told_with_its_field() {
     fails("runs = 10", "", "campaign.runs", "missing, it must be given");
     fails("runs = 10", "runs = 0", "campaign.runs", "is 0, must be from 1 to 9007199254740992");
     fails("seed = 7", "seed = -7", "campaign.seed", "is -7, must be a whole number >= 0");
-    fails("seed = 7", "sead = 7", "campaign.sead", "is no key here (did you mean seed?)");
+    fails("seed = 7", "sead = 7", "campaign.sead", "is not a key here (did you mean seed?)");
     fails("\"random\"", "\"halton\"", "campaign.sampling", "is \"halton\", must be \"random\", ");
     fails("seed = 7", "step = nan", "campaign.step", "is NaN; must be finite");
     fails("seed = 7", "stop_time = -1.0", "campaign.stop_time", "is -1 s; must be after start_time = 0 s");
@@ -439,8 +439,8 @@ fn each_defect_is_told_with_its_field() {
     workshop.write("old.parquet", "no Parquet");
     workshop.punctual(["campaign", "c.toml", "-o", "old.parquet"]).fails_like(
         2,
-        "--output: old.parquet is there already: ",
-        &["it is no Parquet file", "remove it, or give another output"],
+        "--output: old.parquet already exists: ",
+        &["it is not a Parquet file", "remove it, or give another output"],
     );
     // A column for each number of a barrier, and for the peak of each input.
     workshop.write(
@@ -452,7 +452,7 @@ fn each_defect_is_told_with_its_field() {
     workshop.write("c.toml", "system = \"own.toml\"\n[campaign]\nruns = 1\n");
     workshop.punctual(["campaign", "c.toml"]).fails(
         2,
-        "component: two columns of a row are called filter.peak.left; call its barrier or its input otherwise",
+        "component: two columns of a row are called filter.peak.left; rename the barrier or the input",
     );
 }
 
@@ -705,7 +705,7 @@ fn shards_join_to_the_campaign_of_one_machine() {
     workshop.write("half.parquet", &bytes[..bytes.len() / 2]);
     join(&[first, "half.parquet", third]).fails_like(
         2,
-        "--join: half.parquet is no part of a campaign, or only half of one: ",
+        "--join: half.parquet is not part of a campaign, or is incomplete: ",
         &["make it again with --shard"],
     );
     fs::create_dir(workshop.path("begun.parquet.parts")).expect("a folder");
@@ -821,7 +821,7 @@ fn a_shard_can_be_ended_at_any_point() {
         |part: &str, output: &str| workshop.punctual(["campaign", "c.toml", "--shard", part, "-o", output]);
     shard("1/2", "cut.parquet").fails_like(2, "--output: cut.parquet.parts is of another campaign", &[]);
     let resumed = shard("2/2", "cut.parquet");
-    assert_eq!(resumed.stderr, format!("note: {before} of {} runs were there already\n", MANY / 2));
+    assert_eq!(resumed.stderr, format!("note: {before} of {} runs already existed\n", MANY / 2));
     resumed.success();
     shard("2/2", "whole.parquet").success();
     assert!(workshop.bytes("cut.parquet") == workshop.bytes("whole.parquet"), "the bytes differ");
@@ -839,7 +839,7 @@ fn a_packed_campaign_needs_no_other_file() {
     workshop.punctual(["campaign", "c.toml", "--pack", "c.json"]).success();
     workshop
         .punctual(["campaign", "c.toml", "--pack", "c.toml"])
-        .fails(2, "--pack: c.toml is there already and is no packed campaign; give another name");
+        .fails(2, "--pack: c.toml already exists and is not a packed campaign; give another name");
     let packed = workshop.text("c.json");
     let elsewhere = Workshop::new();
     elsewhere.write("c.json", &packed);
@@ -855,7 +855,7 @@ fn a_packed_campaign_needs_no_other_file() {
         packed.replacen(env!("CARGO_PKG_VERSION"), "0.0.0", 1),
         "was packed by version 0.0.0 of this program",
     );
-    refused(packed[..packed.len() / 2].to_owned(), "is no whole campaign that `--pack` wrote");
+    refused(packed[..packed.len() / 2].to_owned(), "is not a complete campaign written by `--pack`");
 }
 
 /// A plant whose way is the sum of four normal numbers times 1 - exp(-2), and a wall at `d` (m) that nothing keeps it
@@ -914,8 +914,7 @@ fn a_rare_failure_is_estimated_and_shown() {
     assert_eq!((&one["probability"], &one["interval"]), (&report["probability"], &report["interval"]));
     assert!(workshop.bytes("again.parquet") == workshop.bytes("c-worst.parquet"), "the bytes differ");
 
-    rare(&["--rare"])
-        .fails(2, "--output: c-worst.parquet is there already; remove it, or give another output");
+    rare(&["--rare"]).fails(2, "--output: c-worst.parquet already exists; remove it, or give another output");
     rare(&["--rare=4"]).fails_like(2, "invalid value '4' for '--rare", &[]);
     let refused = |text: String, message: &str| {
         workshop.write("c.toml", text);
@@ -948,7 +947,7 @@ fn a_rare_failure_is_estimated_and_shown() {
         "distribution = \"normal\"\nmean = 0\ndeviation = 1",
         "distribution = \"choice\"\nvalues = [0.0, 0.1]",
     );
-    refused(narrow, "--rare: found no way to a failure: the least h that ");
+    refused(narrow, "--rare: found no path to a failure: the least h that ");
 }
 
 /// Runs that end before a deadline keep no promise: the reason is said, whatever is asked.
@@ -1141,7 +1140,7 @@ fn a_course_is_the_same_in_every_run() {
     let text = drifting(&workshop, 9.0).replace("runs = 1\n", "runs = 2\n");
     let (system, _) = text.split_once("[vary.").expect("the first table");
     let system = system.replace("start = { \"u.u\" = 0.0, inner", "start = { inner");
-    let course = "[vary.\"plant.u.u\"]\ndistribution = \"course\"\nvalues = [1.0, -3.0]\nperiod = 1.0\n";
+    let course = "[vary.\"plant.u.u\"]\ndistribution = \"sequence\"\nvalues = [1.0, -3.0]\nperiod = 1.0\n";
     workshop.write("c.toml", system.clone() + course);
     workshop.punctual(["campaign", "c.toml"]).success();
     let (names, rows) = rows(&workshop.path("c.parquet"));
@@ -1162,9 +1161,9 @@ fn a_course_is_the_same_in_every_run() {
     refused(course.replace("1.0\n", "0.0\n"), "u.u\".period: is 0, must be finite and >= 1e-9");
     refused(
         course.replace("values = [1.0, -3.0]\n", ""),
-        "u.u\".values: missing; distribution = \"course\" needs values, period",
+        "u.u\".values: missing; distribution = \"sequence\" needs values, period",
     );
     let fixed = course.replace("plant.u.u", "plant.x0.x")
         + "[vary.\"plant.u.u\"]\ndistribution = \"choice\"\nvalues = [0.0]\n";
-    refused(fixed, "x0.x\".distribution: is \"course\", which is for what may change in a run");
+    refused(fixed, "x0.x\".distribution: is \"sequence\", which is for what may change in a run");
 }

@@ -62,7 +62,7 @@ fn a_filter_that_is_given_the_derivatives() {
         (&["--x0", start, "--effort"], "--effort: simulates, but barrier goal is external: it has no model"),
         (
             &["--x0", "x_p=1"],
-            "--x0: \"x_p\" is no state, must be one of goal.lf0, goal.lf1, goal.lf2, goal.lg.u_x, goal.lg.u_y, speed.lf0, speed.lf1, speed.lg.u_x, speed.lg.u_y",
+            "--x0: \"x_p\" is not a state, must be one of goal.lf0, goal.lf1, goal.lf2, goal.lg.u_x, goal.lg.u_y, speed.lf0, speed.lf1, speed.lg.u_x, speed.lg.u_y",
         ),
     ] {
         workshop.punctual(["check", "external.toml"].iter().chain(arguments)).fails(2, message);
@@ -165,7 +165,7 @@ fn a_mixed_relative_degree_is_refused() {
 fn starts_that_cannot_be_used() {
     let workshop = workshop(&[]);
     for (x0, message) in [
-        ("w=1", "--x0: \"w\" is no state, must be one of x_p, y_p, theta, v"),
+        ("w=1", "--x0: \"w\" is not a state, must be one of x_p, y_p, theta, v"),
         ("v", "--x0: is \"v\", must be like \"v=1.5\""),
         ("v=nan", "--x0: is \"v=nan\", must be a finite number"),
     ] {
@@ -198,12 +198,12 @@ fn bounds_decide_what_deadline_can_be_met() {
     let (code, lost) = with("0.1");
     assert_eq!((code, &lost["deadline"]), (1, &"cannot_be_met".into()), "{lost}");
     // √(2 · 61.64/0.1), and more.
-    let (least, most) = (lost["soonest_at_least"].as_f64(), lost["soonest_at_most"].as_f64());
+    let (least, most) = (lost["earliest_at_least"].as_f64(), lost["earliest_at_most"].as_f64());
     assert!(least.is_some_and(|t| (t - 35.11).abs() < 0.01) && most >= least, "{lost}");
     let (code, met) = with("20.0");
     assert_eq!((code, &met["deadline"]), (0, &"can_be_met".into()), "{met}");
-    let most = met["soonest_at_most"].as_f64();
-    assert!(most.is_some_and(|t| t < 10.0) && most >= met["soonest_at_least"].as_f64(), "{met}");
+    let most = met["earliest_at_most"].as_f64();
+    assert!(most.is_some_and(|t| t < 10.0) && most >= met["earliest_at_least"].as_f64(), "{met}");
 }
 
 /// The table and the lines to paste; with these the deadline is kept, with less it was not.
@@ -249,36 +249,36 @@ fn a_plan_keeps_every_promise_or_is_not_found() {
         let words = ["check", "filter.toml", "--x0", "theta=0.3"];
         let report = workshop.punctual(words.iter().chain(&["--json"])).stdout;
         let report: Value = serde_json::from_str(&report).expect("JSON");
-        (report["witness"].clone(), workshop.punctual(words).stdout)
+        (report["backup_plan"].clone(), workshop.punctual(words).stdout)
     };
     // Ample bounds: a plan, and a sooner one. At rest past the deadline, within the bounds.
     let (witness, text) = with("8.0", "");
     assert!(
-        text.contains("witness: a plan within the bounds keeps every promise, whatever u_ref is\n"),
+        text.contains("backup plan: found; within the bounds, it keeps every promise, whatever u_ref is\n"),
         "{text}"
     );
     assert_eq!(witness["found"], true);
-    let factor = |witness: &Value| witness["soonest_factor"].as_f64();
+    let factor = |witness: &Value| witness["earliest_factor"].as_f64();
     assert!(factor(&witness).is_some_and(|f| f < 1.0), "{witness}");
     let plan = &witness["plan"];
-    assert!(plan["rest"].as_f64() > Some(10.0), "{witness}");
+    assert!(plan["at_equilibrium_from"].as_f64() > Some(10.0), "{witness}");
     assert!(plan["inputs"][0][1].as_f64().is_some_and(|peak| 0.0 < peak && peak <= 8.0), "{witness}");
     // At 0.8 m/s² the edge, 61.6 m away, is passed after 12.4 s at the earliest, after 14.95 s by who stops straight ahead inside, and
     // sooner by who turns there.
     let (witness, text) = with("0.8", "");
     assert!(
-        text.contains("witness: NONE was found: by the nearest way tried, goal is not met at "),
+        text.contains("backup plan: NONE was found: in the closest attempt, goal is not met at "),
         "{text}"
     );
     assert_eq!(witness["found"], false);
     assert!(factor(&witness).is_some_and(|f| (1.24..1.65).contains(&f)), "{witness}");
-    let soonest = witness["soonest"][0][1].as_f64();
+    let soonest = witness["earliest"][0][1].as_f64();
     assert!(soonest.zip(factor(&witness)).is_some_and(|(s, f)| (s - 10.0 * f).abs() < 1e-9), "{witness}");
     // What no plan accounts for is said.
     let (witness, text) = with("8.0", "\ndisturbance = 0.1 #");
     let reason = "goal.disturbance is 0.1, must be 0 for a plan";
     assert_eq!((&witness["found"], &witness["reason"]), (&false.into(), &reason.into()), "{witness}");
-    assert!(text.contains(&format!("witness: NONE was found: {reason}\n")), "{text}");
+    assert!(text.contains(&format!("backup plan: NONE was found: {reason}\n")), "{text}");
 }
 
 /// A filter that follows plans and finds none promises nothing, although its rows keep the set from there: the code shows it,
@@ -311,7 +311,7 @@ expression = "p + 1"
     let done = written(0.5);
     assert_eq!(done.code, 1, "{done:#?}");
     assert!(
-        done.stdout.contains("every promise is kept") && done.stdout.contains("witness: NONE was found"),
+        done.stdout.contains("every promise is kept") && done.stdout.contains("backup plan: NONE was found"),
         "{done:#?}"
     );
     assert!(!done.stdout.contains("for deadlines up to"), "{done:#?}");
@@ -362,7 +362,8 @@ fn a_barrier_that_begins_later_or_ends_is_judged() {
         let report: Value = serde_json::from_str(&done.stdout).expect("JSON");
         let barrier = &report["barriers"][0];
         assert_eq!(barrier["deadline"].as_f64(), Some(deadline));
-        let lists = [&barrier["start"]["reach"]["soonest_at_most"], &report["witness"]["soonest"][0][1]];
+        let lists =
+            [&barrier["start"]["reach"]["earliest_at_most"], &report["backup_plan"]["earliest"][0][1]];
         for soonest in lists.iter().filter_map(|value| value.as_f64()) {
             let range = begin.unwrap_or(0.0)..=end.unwrap_or(f64::INFINITY);
             assert!(range.contains(&soonest), "{window}: {soonest}");
@@ -397,9 +398,9 @@ derivatives = { G = "-0.0317*(G-81)-X*G", X = "-0.0123*X+0.00000492*(I-7)", I = 
     let report = workshop.punctual(["check", "glucose.toml", "--json"]).success();
     let report: Value = serde_json::from_str(&report).expect("JSON");
     let arrival = report["closed_loop"]["barriers"][0]["arrival"].as_f64().expect("it arrives");
-    let soonest = report["barriers"][0]["start"]["reach"]["soonest_at_most"].as_f64().expect("a soonest");
+    let soonest = report["barriers"][0]["start"]["reach"]["earliest_at_most"].as_f64().expect("a soonest");
     assert!((18.0..19.0).contains(&arrival) && soonest <= arrival + 1e-9, "{soonest} s, {arrival} s");
-    assert!(report["witness"]["soonest"][0][1].as_f64().is_some_and(|at| at <= arrival + 1e-9));
+    assert!(report["backup_plan"]["earliest"][0][1].as_f64().is_some_and(|at| at <= arrival + 1e-9));
     assert_eq!(report["warnings"].as_array().map(Vec::len), Some(0), "{report}");
 }
 
@@ -436,7 +437,7 @@ fn sets_that_are_apart_are_refused_by_name() {
         workshop.write("filter.toml", point_mass(before, &barriers.concat()));
         let report = workshop.punctual(["check", "filter.toml", "--json"]).stdout;
         let report: Value = serde_json::from_str(&report).expect("JSON");
-        report["witness"]["reason"].as_str().unwrap_or_default().to_owned()
+        report["backup_plan"]["reason"].as_str().unwrap_or_default().to_owned()
     };
     let goal = |more: &str| disc("goal", "disc", [8.0, 2.0], 1.0, more);
     let rock = |radius: f64, more: &str| disc("rock", "obstacle", [8.5, 2.0], radius, more);
@@ -466,7 +467,7 @@ fn sets_that_are_apart_are_refused_by_name() {
     // Bounds of a point.
     let fixed = "bounds = { u_x = [0.0, 0.0], u_y = [0.0, 0.0] }\nx0 = { v_x = 1.0 }";
     let said = reason(fixed, &[goal("deadline = 8.0")]);
-    let wanted = "the bounds fix every input (u_x = 0, u_y = 0), so that nothing can steer the plant; by the nearest way tried, goal is not met at ";
+    let wanted = "the bounds fix every input (u_x = 0, u_y = 0), so that nothing can steer the plant; in the closest attempt, goal is not met at ";
     assert!(said.starts_with(wanted), "{said}");
 }
 
@@ -480,7 +481,7 @@ fn a_run_says_what_check_knows() {
         format!("{}{}", done.stdout, done.stderr)
     };
     let soon = told(&disc("goal", "disc", [30.0, 0.0], 1.0, "deadline = 4.0"));
-    assert!(soon.contains("soonest deadline with a plan: goal "), "{soon}");
+    assert!(soon.contains("earliest deadline with a plan: goal "), "{soon}");
     let root = told(&disc(
         "goal",
         "quadratic_disc",

@@ -309,7 +309,7 @@ fn the_wanted_input_of_a_check() {
     assert!(done.stdout.contains("warning: the closed loop takes inputs without bounds: a "), "{done:#?}");
     for (words, message) in [
         ("damping", "is \"damping\", which is for the vehicles by name; give none, or values as \"a=0\""),
-        ("w=1", "\"w\" is no input, must be one of a"),
+        ("w=1", "\"w\" is not an input, must be one of a"),
         ("a", "is \"a\", must be none, damping, or like \"a=0.5\""),
         ("a=nan", "is \"a=nan\", must be a finite number"),
     ] {

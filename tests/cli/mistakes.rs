@@ -17,15 +17,15 @@ const MISTAKES: [(&str, &str, &str, &str); 38] = [
         "unicycle-filter",
         "radius",
         "raduis",
-        "barrier[0].raduis: is no key here (did you mean radius?) (line 11)",
+        "barrier[0].raduis: is not a key here (did you mean radius?) (line 11)",
     ),
     (
         "unicycle-filter",
         "centre",
         "center",
-        "barrier[0].center: is no key here (did you mean centre?) (line 10)",
+        "barrier[0].center: is not a key here (did you mean centre?) (line 10)",
     ),
-    ("unicycle-filter", "[plant]", "[Plant]", "Plant: is no key here (did you mean plant?) (line 5)"),
+    ("unicycle-filter", "[plant]", "[Plant]", "Plant: is not a key here (did you mean plant?) (line 5)"),
     (
         "unicycle-filter",
         "\"filter\"",
@@ -153,7 +153,7 @@ const MISTAKES: [(&str, &str, &str, &str); 38] = [
         "jerk-car-filter",
         "[plant.derivatives]",
         "[plant.derivative]",
-        "plant.derivative: is no key here (did you mean derivatives?) (line 17)",
+        "plant.derivative: is not a key here (did you mean derivatives?) (line 17)",
     ),
     ("jerk-car-filter", "\nv = \"acc\"", "", "plant.derivatives.v: missing, every state needs one"),
     (
@@ -207,7 +207,7 @@ const MISTAKES: [(&str, &str, &str, &str); 38] = [
         "jerk-car-filter",
         "\"p - d\"",
         "\"norm(p - d)\"",
-        "barrier[0].expression: calls norm, which is no function; the functions are sqrt, exp, ln, sin, cos, tan, atan, atan2, \
+        "barrier[0].expression: calls norm, which is not a function; the functions are sqrt, exp, ln, sin, cos, tan, atan, atan2, \
          abs, tanh, min, max",
     ),
     (
@@ -226,7 +226,7 @@ const MISTAKES: [(&str, &str, &str, &str); 38] = [
         "jerk-car-filter",
         "step_size",
         "step",
-        "experiment.step: is no key here (did you mean step_size?) (line 36)",
+        "experiment.step: is not a key here (did you mean step_size?) (line 36)",
     ),
     (
         "jerk-car-plant",
@@ -286,8 +286,8 @@ fn files_of_another_kind() {
     let many = "this is a campaign file, which `punctual campaign` takes";
     let archive =
         "it is an archive, such as an FMU, and no text; `punctual inspect` and `punctual validate` take FMUs";
-    let utf16 = "it is in UTF-16, must be in UTF-8; editors save it so";
-    let latin1 = "line 2 is no text in UTF-8, as all of it must be; editors save it so";
+    let utf16 = "it is in UTF-16, must be in UTF-8; save the file as UTF-8";
+    let latin1 = "line 2 is not valid UTF-8; save the file as UTF-8";
     for (command, file, message) in [
         ("check", "system.toml", format!("system.toml: kind: missing: {system}")),
         ("check", "campaign.toml", format!("campaign.toml: kind: missing: {many}")),

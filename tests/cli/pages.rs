@@ -40,7 +40,7 @@ fn the_tutorial_is_what_happens() {
     assert_told(refused, &told);
     assert!(text.contains("3.01 s (no input within") && told.contains("3.01 s (no input within"));
     assert_eq!(workshop.punctual(["run", "car.toml"]).code, 1, "refused and missed");
-    changed("deadline = 10.0", "when_infeasible = \"soonest\"\ndeadline = 4.0");
+    changed("deadline = 10.0", "when_infeasible = \"earliest\"\ndeadline = 4.0");
     let told = workshop.punctual(["run", "car.toml"]);
     assert!(text.contains("after 4.13 s") && told.code == 1 && told.stdout.contains("4.131"), "{told:#?}");
 

@@ -234,7 +234,7 @@ fn local_variables_are_recorded_and_connected() {
         );
         let done = workshop.punctual(["run", "system.toml", "--out", "out"]);
         let note =
-            "note: one.y is no output, so it is not read during the initialisation: two.u gets 0 there\n";
+            "note: one.y is not an output, so it is not read during the initialisation: two.u gets 0 there\n";
         assert!(done.code == 0 && done.stderr.contains(note), "{done:#?}");
         let table = Table::parse(&workshop.text("out/system.csv"));
         assert_eq!((table.column("one.y"), table.column("two.u")), (steps.clone(), steps.clone()), "{order}");
@@ -317,7 +317,7 @@ fn other_interfaces_and_versions_are_out_of_scope() {
         let other = description("none", &[("fmiVersion=\"2.0\"", &format!("fmiVersion=\"{version}\""))]);
         misbehaving::write(&workshop, "one.fmu", other, &misbehaving::library(&[]));
         let message = format!(
-            "one.fmu: cannot be run here: it is of FMI {version}, and this program is for FMI 2.0 and 3.0; export it anew as \
+            "one.fmu: cannot be run here: it is of FMI {version}, and this program is for FMI 2.0 and 3.0; export it again as \
              one of these"
         );
         for command in ["validate", "inspect"] {
@@ -341,7 +341,7 @@ fn a_folder_around_everything_is_told() {
     archive.add("my model/resources/x.txt", "x").expect("an entry");
     workshop.write("one.fmu", archive.to_bytes().expect("an archive"));
     let message = "modelDescription.xml: is not at the top of the archive, but in my model/: an FMU holds what is in that \
-                   folder, without the folder; archive it anew from inside";
+                   folder, without the folder; archive it again from inside";
     workshop.punctual(["inspect", "one.fmu"]).fails(1, &format!("one.fmu: {message}"));
     let done = workshop.punctual(["validate", "one.fmu"]);
     assert!(done.code == 1 && done.stdout.contains(message), "{done:#?}");

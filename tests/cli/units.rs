@@ -156,7 +156,7 @@ fn a_factor_of_the_file_stands_and_an_offset_comes_after_the_units() {
     };
     let own = |more: &str| {
         let (value, notes) = first(more);
-        (value, notes.contains("a factor of the file stands, though the units make another one: plant.x.p (cm) → filter.x.p (m) has"))
+        (value, notes.contains("the factor of the file is used, although the units give another one: plant.x.p (cm) → filter.x.p (m) has"))
     };
     assert_eq!(own(""), (0.2, false));
     assert_eq!(own("offset = 0.5"), (0.7, false));

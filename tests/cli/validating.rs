@@ -122,7 +122,7 @@ fn the_schema_on_elements() {
     among(
         "  <DefaultExperiment",
         "  <TypeDefinitions><SimpleType name=\"T\"><Boolean/></SimpleType></TypeDefinitions><DefaultExperiment",
-        "error schema.element D:14: TypeDefinitions stands too late in fmiModelDescription; the order is ",
+        "error schema.element D:14: TypeDefinitions comes too late in fmiModelDescription; the order is ",
     );
     among("</ModelVariables>", "x</ModelVariables>", "error schema.text D:");
     among("fmiModelDescription fmi", "x:fmiModelDescription xmlns:x=\"urn:x\" fmi", "error xml.readable D:");
@@ -478,7 +478,7 @@ fn entries_compressed_in_other_ways() {
         (9, "deflate64"),
         (93, "zstd"),
         (95, "xz"),
-        (1, "a method of its own, Unsupported(1)"),
+        (1, "an unknown method, Unsupported(1)"),
     ] {
         let workshop = Workshop::new();
         misbehaving::write(&workshop, "x.fmu", description("none", &[]), &misbehaving::library(&[]));

@@ -137,7 +137,7 @@ def test_guarantees_are_those_of_the_rows():
         steps = [own.step(k * STEP, x[k, i], u_ref[k, i]) for i, own in enumerate(singles)]
         assert batch.guaranteed.tolist() == [[b.guaranteed for b in step.barriers.values()] for step in steps]
     assert batch.guaranteed.any() and not batch.guaranteed.all()
-    # What begins anew has no promise until its next step.
+    # What restarts has no promise until its next step.
     told, chosen = batch.guaranteed, batch.guaranteed.any(axis=1) & (np.arange(n) % 2 == 0)
     assert chosen.any()
     batch.rearm(chosen)

@@ -250,7 +250,7 @@ def test_what_is_not_promised_is_said():
     own = punctual.Filter(assured(2.0))
     step = own.step(0.0, [0.0, 0.0, 1.0, 0.0])
     assert step.assurance is punctual.Assurance.REFUSED and not step.barriers["goal"].guaranteed
-    assert own.plan is None and own.refusal.startswith("by the nearest way tried, goal is not met at 2 s")
+    assert own.plan is None and own.refusal.startswith("in the closest attempt, goal is not met at 2 s")
     assert punctual.Filter(FILTER).step(0.0, [0.0, 0.0, 1.0, 0.0]).assurance is None
     with pytest.raises(punctual.Error, match='assurance: is "on", must be "off": actuation_delay is 0.01, must be 0 for a plan'):
         punctual.Filter(assured(8.0) | {"actuation_delay": 0.01})
@@ -290,7 +290,7 @@ def driven(own, steps, x, u_ref):
 
 
 def planned(own):
-    """The plan in hand, as bits."""
+    """The backup plan, as bits."""
     plan = own.plan
     return plan and [plan.times.tobytes(), plan.x.tobytes(), plan.u.tobytes(), plan.effort, plan.tightest]
 
@@ -328,7 +328,7 @@ def test_a_pickle_needs_no_file_and_goes_to_another_process(tmp_path):
 def test_another_pickle_is_refused():
     load, ((version, text, folder, memories), *rest) = punctual.Filter(ASSURED).__reduce__()
     assert load((version, text, folder, memories), *rest).step(0.0, np.zeros(4)).u.shape == (2,)
-    with pytest.raises(punctual.Error, match=f"version: .* by punctual 0.0.9, must be {version}; make it anew"):
+    with pytest.raises(punctual.Error, match=f"version: .* by punctual 0.0.9, must be {version}; create it again"):
         load(("0.0.9", text, folder, memories), *rest)
     with pytest.raises(punctual.Error, match="memory: cannot be read: "):
         load((version, text, folder, [memories[0][:3]]), *rest)

@@ -305,7 +305,7 @@ def test_what_the_filter_refuses_names_the_function():
 
 
 def test_a_function_where_no_expression_stands_is_refused():
-    words = r"^plant.inputs\[0\].max: is <function .*; a function may stand in the place of an expression only$"
+    words = r"^plant.inputs\[0\].max: is <function .*; a function may replace only an expression$"
     with pytest.raises(TypeError, match=words):
         punctual.Filter(model() | {"plant": {"inputs": [{"name": "F", "max": lambda x: 1}]}})
 

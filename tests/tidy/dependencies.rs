@@ -143,7 +143,7 @@ impl Order {
                 };
                 assert!(
                     used == module || other < rank,
-                    "{}:{line}: {module} uses {used}, which does not stand above it",
+                    "{}:{line}: {module} uses {used}, which is not above it",
                     source.path
                 );
             }

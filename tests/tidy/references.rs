@@ -261,7 +261,7 @@ fn anchors_are_unique_and_of_use() {
             let heads = heading(pair[1].1).is_some() || pair[1].1.starts_with("**");
             let link = format!("#{anchor}");
             let used = heads || TEXTS.iter().any(|t| t.text.contains(&link));
-            assert!(used, "{path}: #{anchor} stands at no heading, and nothing refers to it");
+            assert!(used, "{path}: #{anchor} is at no heading, and nothing refers to it");
         }
     }
 }

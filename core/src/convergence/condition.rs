@@ -158,7 +158,7 @@ pub struct Abilities {
     pub covers_holds: bool,
     /// Its bound allows for [errors](Sample::errors) of the derivatives.
     pub allows_errors: bool,
-    /// It may start anew on the way at any time, and its theorem then applies again.
+    /// It may restart on the way at any time, and its theorem then applies again.
     pub restarts: bool,
 }
 
@@ -220,7 +220,7 @@ pub trait Condition {
 
     /// (S) of [`sampled`] from the sample `at`, where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ and h⁽ⁿ⁾ is disturbed by up to `disturbance`,
     /// over `period` > 0 seconds; `None` where φ is not linear. It follows from [`rates`](Self::rates) and
-    /// [`profile`](Self::profile), so that there is nothing to define. It stands here to be compiled with them.
+    /// [`profile`](Self::profile), so that there is nothing to define. It is here to be compiled with them.
     fn over_period(&self, at: &Sample, h: &[f64], period: f64, disturbance: f64) -> Option<PeriodBound> {
         sampled::over_period(self, at, h, period, disturbance)
     }

@@ -22,7 +22,7 @@
 //! can only overshoot into the set, by at most α |e|^p δ over a period δ; within
 //! (αδ)^{1/(1−p)} of zero, where that exceeds |e|, one step arrives. Above zero the same condition
 //! (ė ≥ −α e^p) lets e reach zero in finite time and a held input pass it, back and forth: chattering.
-//! So it is used below zero only, and [`FixedTime`](super::FixedTime) hands over to the stay constraint,
+//! So it is used below zero only, and [`FixedTime`](super::FixedTime) switches to the stay constraint,
 //! which is linear, at the first sample with e ≥ 0.
 //!
 //! # References
@@ -42,7 +42,7 @@ use crate::error::{Error, ErrorKind};
 #[cfg_attr(feature = "serde", serde(try_from = "f64"))]
 pub struct Exponent(f64);
 
-/// Equality is an equivalence, as p is never not-a-number.
+/// Equality is an equivalence, as p is never NaN.
 impl Eq for Exponent {}
 
 impl Default for Exponent {

@@ -41,7 +41,7 @@ pub enum Refusal {
     /// The repeated root has no admissible rate. In its place: (D + a)ⁿ (h − μ) ≥ 0 with the stay rate. That
     /// leads towards the set without a deadline, and guarantees nothing until the stay constraint takes over.
     NoAdmissibleRate(NoAdmissibleRate),
-    /// The profile of one's own fails its check from this anchor. In its place: the Hermite profile, with its
+    /// The custom profile fails its check from this anchor. In its place: the Hermite profile, with its
     /// guarantee.
     Profile(ProfileError),
 }
@@ -85,7 +85,7 @@ impl FixedTime {
         Ok(Self { n, settings, approach: Approach::new(&settings) })
     }
 
-    /// The same promise along a profile of one's own. It is [checked](super::profile::check) at every anchor,
+    /// The same promise along a custom profile. It is [checked](super::profile::check) at every anchor,
     /// some 3000 evaluations; one that fails is [refused](Refusal::Profile).
     ///
     /// # Errors
@@ -93,13 +93,13 @@ impl FixedTime {
     /// A method other than [`Method::ReferenceProfile`](super::Method::ReferenceProfile).
     pub fn with_profile(self, profile: impl Profile + Send + Sync + 'static) -> Result<Self, Error> {
         let Approach::Profile(reference) = self.approach else {
-            let message = "a profile of one's own belongs to the reference profile";
+            let message = "a custom profile requires the reference profile";
             return Err(Error::new(ErrorKind::Unsupported, "method", message));
         };
         Ok(Self { approach: Approach::Profile(reference.along(Arc::new(profile))), ..self })
     }
 
-    /// A constraint of one's own in place of the settings' method. Of the settings only deadline, margin and
+    /// A custom constraint in place of the settings' method. Of the settings only deadline, margin and
     /// disturbance count. Unless its [abilities](super::condition::Abilities) say otherwise, nothing is guaranteed
     /// and the phases tell what is seen ([`Phase::Stay`]: h ≥ 0, [`Phase::Left`]: outside again). Unless it gives its
     /// [rates](Condition::rates), it is enforced at the samples only, under any
@@ -107,7 +107,7 @@ impl FixedTime {
     ///
     /// # Errors
     ///
-    /// A method other than the default, a profile of one's own, or a recovery time.
+    /// A method other than the default, a custom profile, or a recovery time.
     pub fn with_condition(self, condition: impl Condition + Send + Sync + 'static) -> Result<Self, Error> {
         let settings = &self.settings;
         let is_plain = match &self.approach {
@@ -116,9 +116,9 @@ impl FixedTime {
             Approach::Root(_) | Approach::First(_) => false,
         };
         let message = if !is_plain {
-            Some(("method", "a constraint of one's own takes the place of method and profile"))
+            Some(("method", "a custom constraint replaces method and profile"))
         } else if settings.recovery.is_some() {
-            Some(("recovery", "a constraint of one's own knows no recovery"))
+            Some(("recovery", "a custom constraint has no recovery"))
         } else {
             None
         };
@@ -128,7 +128,7 @@ impl FixedTime {
         Ok(Self { approach: Approach::Own(Arc::new(condition)), ..self })
     }
 
-    /// Whether a constraint of one's own is in force ([`Self::with_condition`]).
+    /// Whether a custom constraint is in force ([`Self::with_condition`]).
     pub(crate) fn has_condition(&self) -> bool {
         self.approach.is_own()
     }
@@ -215,13 +215,13 @@ impl FixedTime {
         let h: &[f64; N] = h.first_chunk().expect("n derivatives");
         let lowest: [f64; N] = from_fn(|k| h[k] - errors[k]);
         let is_outside = h[0] + errors[0] < 0.0;
-        // Anchor at the first sample, and anew where a set that has a recovery time was left.
+        // Anchor at the first sample, and again where a set that has a recovery time was left.
         if state.phase == Phase::Waiting {
             self.anchor(state, t, &lowest, self.deadline(), 0.0);
         }
         let was_left = state.phase == Phase::Stay && is_outside;
         if let Some(recovery) = self.settings.recovery.filter(|_| was_left) {
-            // What was to be reached may be left again while its deadline is ahead, which stands.
+            // What was to be reached may be left again while its deadline, which is kept, is ahead.
             let left = state.deadline - state.elapsed(t);
             let stands = state.recoveries == 0 && !state.was_inside() && left > 0.0;
             self.anchor(state, t, &lowest, if stands { left } else { recovery }, state.period);
@@ -332,7 +332,7 @@ impl FixedTime {
     }
 
     /// The reason why another method than the configured one is in force since the anchor in `state`. `None` where
-    /// it is the configured one, and before the anchor. Computed anew: not for every step.
+    /// it is the configured one, and before the anchor. Recomputed at every call: not for every step.
     pub fn refusal(&self, state: &FixedTimeState) -> Option<Refusal> {
         if !state.fallback || state.phase == Phase::Waiting {
             return None;
@@ -340,7 +340,7 @@ impl FixedTime {
         self.approach.condition().refusal(&state.at_anchor(self.n))
     }
 
-    /// Starts the promise anew at time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ (finite): the barrier is to
+    /// Restarts the promise at time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ (finite): the barrier is to
     /// be reached within `deadline` seconds from there, with inputs held for `period` ≥ 0 seconds (0: not
     /// held, or not known). The count of recoveries goes on.
     ///
@@ -396,12 +396,12 @@ impl FixedTime {
         (state.arrival, state.on_course, state.phase, state.gain) = (arrival, on_course, phase, gain);
     }
 
-    /// Starts the condition anew from the sample at time `t` (s) if its theorem has been lost on the way there. `state`
+    /// Restarts the condition from the sample at time `t` (s) if its theorem has been lost on the way there. `state`
     /// has been moved to that sample, and `h` holds the smallest h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ there. The deadline stays the same. The
-    /// error is zero again, so the theorem applies again. Returns whether it started anew.
+    /// error is zero again, so the theorem applies again. Returns whether it restarted.
     ///
     /// It does not shortly before the deadline, where a profile from anywhere would ask for any input, nor along a
-    /// profile of one's own, whose check takes long.
+    /// custom profile, whose check takes long.
     pub(crate) fn restart(&self, state: &mut FixedTimeState, t: f64, h: &[f64], period: f64) -> bool {
         /// Samples, and part of the configured deadline, that must be left.
         const SAMPLES: f64 = 10.0;

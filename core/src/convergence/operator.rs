@@ -134,7 +134,7 @@ impl Operator {
         let (mut least, mut product) = (f64::INFINITY, 1.0);
         for i in 0..self.n {
             let margin = cascade[0] / product;
-            // Not `f64::min`, which would drop not-a-number.
+            // Not `f64::min`, which would drop NaN.
             if margin < least || margin.is_nan() {
                 least = margin;
             }

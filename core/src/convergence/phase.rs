@@ -44,11 +44,11 @@ impl Phase {
     fn words(self) -> (&'static str, &'static str) {
         match self {
             Self::Waiting => ("waiting", "not begun: no step with valid inputs yet, or not armed"),
-            Self::Approach => ("approach", "on the way, before the deadline"),
-            Self::Late => ("late", "the deadline passed outside; the approach goes on"),
+            Self::Approach => ("approach", "approaching, before the deadline"),
+            Self::Late => ("late", "the deadline passed outside the set; the approach continues"),
             Self::Stay => ("stay", "inside, and kept there"),
             Self::Left => ("left", "outside again; pulled back without a deadline"),
-            Self::Released => ("released", "let go: nothing is asked any more"),
+            Self::Released => ("released", "released: nothing is required any more"),
         }
     }
 

@@ -1,4 +1,4 @@
-//! Reference profiles of one's own, checked before they are trusted.
+//! Custom reference profiles, checked before they are trusted.
 //!
 //! Let r be n − 1 times continuously differentiable with r⁽ⁿ⁾ piecewise continuous, r⁽ʲ⁾(0) = e⁽ʲ⁾(0) for j < n, and
 //! r ≥ 0 from T on. Enforcing

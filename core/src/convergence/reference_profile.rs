@@ -21,7 +21,7 @@ const MARGIN_TOLERANCE: f64 = 1e-12;
 #[derive(Clone)]
 pub(super) struct ReferenceProfile {
     kind: ProfileKind,
-    /// A profile of one's own in place of `kind`.
+    /// A custom profile in place of `kind`.
     own: Option<Arc<dyn Profile + Send + Sync>>,
     rate: Option<f64>,
     rates: Option<Operator>,
@@ -32,12 +32,12 @@ impl ReferenceProfile {
         Self { kind: settings.profile, own: None, rate: settings.rate, rates: settings.rates }
     }
 
-    /// The same along a profile of one's own.
+    /// The same along a custom profile.
     pub(super) fn along(self, own: Arc<dyn Profile + Send + Sync>) -> Self {
         Self { own: Some(own), ..self }
     }
 
-    /// Whether it follows a profile of one's own.
+    /// Whether it follows a custom profile.
     pub(super) fn has_own_profile(&self) -> bool {
         self.own.is_some()
     }
@@ -102,7 +102,7 @@ impl Condition for ReferenceProfile {
     }
 
     fn abilities(&self) -> Abilities {
-        // The check of a profile of one's own takes long.
+        // The check of a custom profile takes long.
         Abilities { hands_over: true, covers_holds: true, allows_errors: true, restarts: self.own.is_none() }
     }
 

@@ -72,8 +72,8 @@ impl FixedTime {
     /// it was anchored there, at `h` itself, with a deadline that is held. `errors` and `means` are those of
     /// [`Self::advance_by`]; the errors are held, and the means move by `moves`.
     ///
-    /// `None` where the condition does not know it: at the anchor of a profile of one's own that does not give its
-    /// [derivative](super::profile::Profile::directional), and under most [conditions](super::condition) of one's own.
+    /// `None` where the condition does not know it: at the anchor of a custom profile that does not give its
+    /// [derivative](super::profile::Profile::directional), and under most custom [conditions](super::condition).
     pub fn differentiate(
         &self,
         state: &FixedTimeState,

@@ -26,7 +26,7 @@ pub enum Method {
     FirstOrder(Exponent),
 }
 
-/// The profile that [`Method::ReferenceProfile`] follows, where it is not one of one's own.
+/// The profile that [`Method::ReferenceProfile`] follows, unless it is a custom one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
@@ -48,7 +48,7 @@ pub enum Infeasible {
     /// Report it and keep the deadline.
     #[default]
     Report,
-    /// Give up the deadline. The promise starts anew from that sample, with twice the soonest time at which h ≥ 0 is
+    /// Give up the deadline. The promise restarts from that sample, with twice the earliest time at which h ≥ 0 is
     /// not ruled out; the factor grows by half each further time. A deadline that passes outside is given up as well.
     /// Where no bound is known, the new one has the configured length. Counted in
     /// [`FixedTimeState::postponed`](super::FixedTimeState::postponed).
@@ -90,7 +90,7 @@ pub struct FixedTimeSettings {
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub margin: f64,
     /// Time in s, finite, > 0, within which a barrier that was left after an arrival is to be reached
-    /// again: leaving then anchors anew with this deadline, or with what is left of the first one while that is
+    /// again: leaving then anchors again with this deadline, or with what is left of the first one while that is
     /// ahead. `None`, the default: leaving is reported ([`Phase::Left`](super::Phase::Left)) and the stay constraint
     /// pulls back, without a deadline.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]

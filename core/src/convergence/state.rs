@@ -19,7 +19,7 @@ pub struct FixedTimeState {
     /// T in s, counted from the anchor; infinite where there is none.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub deadline: f64,
-    /// Number of times that leaving the set has anchored anew
+    /// Number of times that leaving the set has anchored again
     /// ([`FixedTimeSettings::recovery`](super::FixedTimeSettings::recovery)).
     pub recoveries: u32,
     /// Number of deadlines given up for a later one, because the input bounds do not allow them

@@ -10,7 +10,7 @@
 //!
 //! So the rates ≥ 0 that will do are a ray [a_min, ∞), with a_min of [`smallest_rate`]. There is none if and only if
 //! the first derivative that is not zero is negative. A rate that does at one sample does at the next: the rate may
-//! be chosen anew at every sample (`docs/theory.md#rate-for-every-sample`). The least h⁽ⁿ⁾ that a rate asks for,
+//! be chosen again at every sample (`docs/theory.md#rate-for-every-sample`). The least h⁽ⁿ⁾ that a rate asks for,
 //!
 //! ```math
 //! \varphi(a) = -\sum_{j<n} \binom{n}{j} a^{n-j} e^{(j)}, \qquad \frac{d\varphi}{da} = -n\,A_{n-1}(a) \le 0, \tag{W}
@@ -74,7 +74,7 @@ pub(super) fn affordable_margin(rate: f64, h: &[f64]) -> f64 {
     for k in 1..h.len() {
         power *= rate;
         let margin = scaled_coefficient(rate, h, k) / power;
-        // Not `f64::min`, which would drop not-a-number.
+        // Not `f64::min`, which would drop NaN.
         if margin < least || margin.is_nan() {
             least = margin;
         }
@@ -185,7 +185,7 @@ pub fn keep<const N: usize>(h: &[f64; N], margin: f64, base: f64, means: &Means)
     Keep { rate, margin: kept, pull, is_invariant }
 }
 
-/// The condition of a set that is kept: (D + a)ⁿ (h − μ) ≥ pull. Rate, margin and pull are chosen anew at every sample
+/// The condition of a set that is kept: (D + a)ⁿ (h − μ) ≥ pull. Rate, margin and pull are chosen again at every sample
 /// ([`keep`]) and are those of the [`Sample`] then.
 #[derive(Clone, Copy, Debug)]
 pub struct Stay<'a>(pub &'a FixedTimeSettings);
@@ -289,7 +289,7 @@ impl Condition for Stay<'_> {
 #[inline]
 fn outwards(e: &[f64], rate: f64) -> f64 {
     let back = if e.len() == 2 { e[1] / (rate * e[0]) } else { 0.0 };
-    // Not `clamp`, which keeps not-a-number: 0/0 at rest on the boundary.
+    // Not `clamp`, which keeps NaN: 0/0 at rest on the boundary.
     if back > 0.0 { (1.0 - back).max(0.0) } else { 1.0 }
 }
 

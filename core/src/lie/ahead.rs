@@ -9,7 +9,7 @@
 //! \qquad k = 0 \dots n. \tag{4}
 //! ```
 //!
-//! The error is the integrator's, O(σ⁵). One step does where the rate of the state hardly bends over it ([`EVEN`]), else
+//! The error is the integrator's, O(σ⁵). One step does where the rate of the state hardly curves over it ([`EVEN`]), else
 //! [`SUBSTEPS`] are taken. (4) is the exact derivative of what is computed, so Newton's method on it converges
 //! quadratically.
 
@@ -79,22 +79,22 @@ where
     x
 }
 
-/// Largest bend of the rates over one Runge-Kutta step, as a part of a rate, for one step to do.
+/// Largest curvature of the rates over one Runge-Kutta step, as a part of a rate, for one step to do.
 const EVEN: f64 = 4e-4;
 
-/// How often the difference of the two stages in the middle counts in the bend, beside the second difference of all.
+/// How often the difference of the two stages in the middle counts in the curvature, beside the second difference of all.
 ///
 /// Where a state turns by φ as other states grow evenly, the stages in the middle agree, the second difference is φ²/4 and the
 /// step is off by φ⁴/2880 of the way. Where a state decays by the factor e⁻ᶻ both are z²/4 and it is off by z⁴/120. Both are
-/// 1e-9 where the bend is [`EVEN`]; two steps are off by a sixteenth of that.
+/// 1e-9 where the curvature is [`EVEN`]; two steps are off by a sixteenth of that.
 const MIDDLE: f64 = 3.0;
 
-/// How often its own bend a rate counts at most, where bends are compared with the largest rate. Rates of different states
-/// have different units, and one that is constant says nothing of the others: that a vehicle is spun does not make its way
-/// straight.
+/// How often its own curvature a rate counts at most, where curvatures are compared with the largest rate. Rates of
+/// different states have different units, and one that is constant says nothing of the others: that a vehicle is spun does
+/// not make its way straight.
 const COUNTS: f64 = 1e6;
 
-/// Whether the rates at the four stages of a Runge-Kutta step, state by state, bend so little that one step does.
+/// Whether the rates at the four stages of a Runge-Kutta step, state by state, curve so little that one step does.
 #[inline(always)]
 pub fn is_even<S: Scalar>([k1, k2, k3, k4]: [&[S]; 4]) -> bool {
     let (mut most, mut largest) = (0.0_f64, 0.0_f64);
@@ -295,7 +295,7 @@ where
     series
 }
 
-/// Writes the courses of the states from `x` on under the held input `u`: `J x_J = [f(x)]_{J−1} + [g(x)]_{J−1} u`. Once
+/// Writes the expansions of the states from `x` on under the held input `u`: `J x_J = [f(x)]_{J−1} + [g(x)]_{J−1} u`. Once
 /// for a plant, whatever the barriers: it is much code.
 #[inline(never)]
 pub(super) fn path<P, const NX: usize, const NU: usize>(
@@ -329,7 +329,7 @@ pub(super) fn path<P, const NX: usize, const NU: usize>(
     }
 }
 
-/// The course of `barrier` along `path`, from `t` on. Once for a barrier, whatever the plants and degrees.
+/// The expansion of `barrier` along `path`, from `t` on. Once for a barrier, whatever the plants and degrees.
 #[inline(never)]
 pub(super) fn value_along<B, const NX: usize>(barrier: &B, t: f64, path: &[Course]) -> Course
 where
@@ -339,14 +339,14 @@ where
     barrier.value(Taylor::time(t), &states).coefficients
 }
 
-/// The first `K` coefficients of the courses of the states.
+/// The first `K` coefficients of the expansions of the states.
 #[inline(always)]
 fn first_over<const NX: usize, const K: usize>(path: &[CourseOver]) -> [Taylor<Interval, K>; NX] {
     from_fn(|i| Taylor { coefficients: from_fn(|k| path[i][k]) })
 }
 
-/// Writes the first `K` coefficients of the rate of `plant` under `u` on enclosures of the courses of the states. Once for a
-/// plant.
+/// Writes the first `K` coefficients of the rate of `plant` under `u` on enclosures of the expansions of the states. Once
+/// for a plant.
 #[inline(never)]
 pub(super) fn rates_over<P, const NX: usize, const NU: usize, const K: usize>(
     plant: &P,
@@ -366,7 +366,7 @@ pub(super) fn rates_over<P, const NX: usize, const NU: usize, const K: usize>(
     }
 }
 
-/// `barrier` on enclosures of time and of the courses of the states. Once for a barrier.
+/// `barrier` on enclosures of time and of the expansions of the states. Once for a barrier.
 #[inline(never)]
 pub(super) fn value_over<B, const NX: usize>(barrier: &B, time: Interval, path: &[CourseOver]) -> Interval
 where
@@ -375,7 +375,7 @@ where
     barrier.value(time, &from_fn(|i| path[i][0]))
 }
 
-/// The last coefficient of the course of `barrier` on enclosures of time and of those of the states. Once for a barrier.
+/// The last coefficient of the expansion of `barrier` on enclosures of time and of those of the states. Once for a barrier.
 #[inline(never)]
 pub(super) fn last_over<B, const NX: usize>(barrier: &B, time: Interval, path: &[CourseOver]) -> Interval
 where

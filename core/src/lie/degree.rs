@@ -48,7 +48,7 @@ impl RelativeDegree {
                 "; one constraint cannot use both, so put an integrator before the input that enters first \
                  (dynamics::IntegratedInput)"
             }
-            (Self::NotFinite, _) => "; give samples of your own",
+            (Self::NotFinite, _) => "; provide your own samples",
             _ => "",
         };
         let found = self.describe(|i| format!("u[{}]", i + 1));

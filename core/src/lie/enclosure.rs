@@ -48,6 +48,6 @@ pub fn enclose(
 #[inline(always)]
 pub fn sharper(low: f64, h: f64, slope: Interval, dt: f64) -> f64 {
     let risen = h + dt * slope.low.min(0.0);
-    // Not-a-number is no bound.
+    // NaN is no bound.
     if risen > low { risen } else { low }
 }

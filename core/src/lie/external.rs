@@ -49,7 +49,7 @@ impl Directional for External {
     }
 }
 
-/// Derivatives of one barrier of relative degree `n` that are computed elsewhere and handed over at every step
+/// Derivatives of one barrier of relative degree `n` that are computed elsewhere and passed at every step
 /// in place of a state: its n + 1 + `input_dim` components are h, its derivatives of the orders 1 to n − 1,
 /// L_f^n h (the derivative of order n where all inputs are 0), and L_g L_f^(n−1) h (what one unit of each input
 /// adds to that), in `[h]`/s^k and `[h]`/(s^n · unit of u). Of a time-varying h they are total derivatives.

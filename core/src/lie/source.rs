@@ -103,29 +103,30 @@ pub trait Predict {
     /// Writes ẋ at `x` under `u`.
     fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]);
 
-    /// Writes the course of every state from `x` on under the held input `u`.
+    /// Writes the expansion of every state from `x` on under the held input `u`.
     fn path(&self, x: &[f64], u: &[f64], out: &mut [Course]);
 
     /// h at time `t` (s) and state `x`.
     fn value(&self, t: f64, x: &[f64]) -> f64;
 
-    /// Writes the course of h along `path`, the courses of all states from `t` on.
+    /// Writes the expansion of h along `path`, the expansions of all states from `t` on.
     fn value_along(&self, t: f64, path: &[Course], out: &mut Course);
 
     /// Writes enclosures of the first `orders` coefficients, 1 to [`COURSE`] − 1, of ẋ under `u`: as a series in time that
-    /// begins anywhere on a stretch of a path, by those of the courses of all states that begin there. Says whether it did:
-    /// the default has none, and then what bends the plant between the instants at which it is looked at is not seen.
+    /// begins anywhere on a stretch of a path, by those of the expansions of all states that begin there. Says whether it
+    /// did: the default has none, and then what curves the plant's motion between the instants at which it is looked at is
+    /// not seen.
     fn rates_over(&self, _path: &[CourseOver], _u: &[f64], _orders: usize, _out: &mut [RateOver]) -> bool {
         false
     }
 
-    /// An enclosure of h on such a stretch, at those of the time (s). The default has none: then what bends h between the
+    /// An enclosure of h on such a stretch, at those of the time (s). The default has none: then what curves h between the
     /// instants at which it is looked at is not seen.
     fn value_over(&self, _time: Interval, _path: &[CourseOver]) -> Option<Interval> {
         None
     }
 
-    /// The same for the last coefficient of the course of h that begins anywhere on that stretch.
+    /// The same for the last coefficient of the expansion of h that begins anywhere on that stretch.
     fn last_over(&self, _time: Interval, _path: &[CourseOver]) -> Option<Interval> {
         None
     }

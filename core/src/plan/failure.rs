@@ -109,16 +109,17 @@ impl fmt::Display for Named<'_> {
                 let at = names.time(time);
                 write!(
                     f,
-                    "the plant is not where the model led; as far off again, {name} would not be met at {at} s, by {missing}"
+                    "the plant is not where the model predicted; with the same deviation again, {name} would not be met at {at} s, by \
+                     {missing}"
                 )
             }
             Failure::Missed { barrier } => {
                 write!(f, "{} came due while no plan was followed", names.barrier(barrier))
             }
-            Failure::NoRest => f.write_str("the plant does not come to rest, or a set moves"),
+            Failure::NoRest => f.write_str("the plant does not reach an equilibrium, or a set moves"),
             Failure::Unsteady => f.write_str(
-                "the plant is so unstable on the way that a deviation too small to measure grows until the plan is lost; wider \
-                 bounds or a start farther from where they end would hold it",
+                "the plant is so unstable along the plan that a deviation too small to measure grows until the plan is lost; \
+                 with wider bounds, or from a start farther from where they no longer suffice, it could be held",
             ),
             Failure::Apart { barriers, contained: true } => write!(
                 f,
@@ -129,7 +130,7 @@ impl fmt::Display for Named<'_> {
             Failure::Apart { barriers, contained: false } => {
                 write!(f, "{}, and both are to be kept at the same time", names.apart(barriers))
             }
-            Failure::Nothing => f.write_str("there is nothing from there that could be promised"),
+            Failure::Nothing => f.write_str("nothing can be promised from there"),
             Failure::TooLong => {
                 f.write_str("there are too many samples until the deadline, or too long a step")
             }

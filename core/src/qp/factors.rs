@@ -3,7 +3,7 @@
 //!
 //! A column is appended by Gram-Schmidt, done twice: that keeps Q orthonormal to round-off for every
 //! column that is not counted as dependent. One is removed by plane rotations of R's rows and Q's
-//! columns. Only the first `len` columns mean anything, so starting anew costs nothing. Arrays have N
+//! columns. Only the first `len` columns mean anything, so restarting costs nothing. Arrays have N
 //! components, of which those from `dim` on are 0.
 
 use crate::elementary::{self, dot};

@@ -133,7 +133,7 @@ impl Bounds {
     /// No bounds.
     pub const NONE: Self = Self { min: [f64::NEG_INFINITY; MAX_INPUTS], max: [f64::INFINITY; MAX_INPUTS] };
 
-    /// `value` moved into the bounds of component `i`; not-a-number becomes the point nearest 0.
+    /// `value` moved into the bounds of component `i`; NaN becomes the point nearest 0.
     pub fn clamp(&self, i: usize, value: f64) -> f64 {
         let value = if value.is_nan() { 0.0 } else { value };
         value.max(self.min[i]).min(self.max[i])

@@ -61,7 +61,7 @@ impl Equations {
             rest.iter_mut().zip(held).for_each(|(rest, held)| *rest -= along * held);
         }
         let left = elementary::sqrt(dot(&rest, &rest));
-        // Not-a-number makes up nothing.
+        // NaN makes up nothing.
         if self.rows == self.inputs || left.is_nan() || left < INDEPENDENT {
             return;
         }

@@ -22,9 +22,9 @@ pub struct VarySection {
     mean: Option<f64>,
     /// Standard deviation before the cut, likewise, > 0.
     deviation: Option<f64>,
-    /// The values to choose from, each as likely as the others; of a course one after the other.
+    /// The values to choose from, each as likely as the others; of a sequence one after the other.
     values: Option<Vec<f64>>,
-    /// Time in s for which a value of a course lasts, > 0.
+    /// Time in s for which a value of a sequence lasts, > 0.
     period: Option<f64>,
 }
 
@@ -48,7 +48,7 @@ impl DistributionName {
             Self::LogUniform => ("log_uniform", &["min", "max"], &[]),
             Self::Normal => ("normal", &["mean", "deviation"], &["min", "max"]),
             Self::Choice => ("choice", &["values"], &[]),
-            Self::Course => ("course", &["values", "period"], &[]),
+            Self::Course => ("sequence", &["values", "period"], &[]),
             Self::Seed => ("seed", &[], &[]),
         }
     }
@@ -215,7 +215,7 @@ impl fmt::Display for Distribution {
             }
             Self::Course { values, period } => {
                 let count = values.len();
-                write!(f, "a course of {count} values, each for {period} s, from {:?} on", values[0])
+                write!(f, "a sequence of {count} values, each for {period} s, from {:?} on", values[0])
             }
             Self::Seed => f.write_str("the seed of the run"),
         }

@@ -175,7 +175,7 @@ pub struct Campaign {
 
 impl Campaign {
     /// Reads and checks the campaign file at `path` with the files that it names: its system file and the
-    /// components' FMUs (or configurations that these are built from, `.toml`). What [`Campaign::packed`] gave stands for
+    /// components' FMUs (or configurations that these are built from, `.toml`). What [`Campaign::packed`] gave replaces
     /// all of them.
     ///
     /// # Errors
@@ -233,14 +233,14 @@ impl Campaign {
     fn unpacked(text: &str, path: &Path) -> Result<Self, Error> {
         let wrong = |message: String| Error::configuration("", format!("{}: {message}", path.display()));
         let Packed { version, fingerprint, runs, source } = serde_json::from_str(text)
-            .map_err(|e| wrong(format!("is no whole campaign that `--pack` wrote: {e}")))?;
+            .map_err(|e| wrong(format!("is not a complete campaign written by `--pack`: {e}")))?;
         let ours = env!("CARGO_PKG_VERSION");
         if version != ours {
             return Err(wrong(format!(
                 "was packed by version {version} of this program, this is version {ours}"
             )));
         }
-        let changed = || wrong("was changed after `--pack` wrote it; pack the campaign anew".to_owned());
+        let changed = || wrong("was changed after `--pack` wrote it; pack the campaign again".to_owned());
         if fingerprint != source.fingerprint() {
             return Err(changed());
         }
@@ -347,8 +347,7 @@ impl Campaign {
                 let wrong =
                     |key, message| Err(in_file(ConfigurationError::new(format!("{field}.{key}"), message)));
                 if !varied.tunable {
-                    let message =
-                        "is \"course\", which is for what may change in a run: inputs and tunable parameters";
+                    let message = "is \"sequence\", which is for what may change in a run: inputs and tunable parameters";
                     return wrong("distribution", message.to_owned());
                 }
                 let step = system.experiment().step;
@@ -488,7 +487,7 @@ impl Campaign {
             let alone = match (&varied.distribution, self.piece()?) {
                 (Distribution::Course { .. }, _) => continue,
                 (Distribution::Seed, Some(steps)) => serde_json::json!({
-                    "distribution": "course",
+                    "distribution": "sequence",
                     "values": choice.pieces,
                     "period": steps as f64 * self.system.experiment().step,
                 }),

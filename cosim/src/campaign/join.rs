@@ -82,7 +82,7 @@ pub fn join(campaign: &Campaign, files: &[PathBuf], output: &Path) -> Result<(),
 
 /// The files that are meant by `files`.
 fn listed(campaign: &Campaign, files: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
-    // What cannot be read is told of as a part.
+    // What cannot be read is reported as a part.
     let is_result = |file: &Path| {
         runner::recorded(file).is_ok_and(|(reader, source)| {
             source == *campaign.source()
@@ -122,7 +122,7 @@ fn checked(campaign: &Campaign, path: PathBuf) -> Result<Part, Error> {
         return Err(refused("is not there".to_owned()));
     }
     let (reader, source) = runner::recorded(&path).map_err(|e| {
-        refused(format!("is no part of a campaign, or only half of one: {e}; make it again with --shard"))
+        refused(format!("is not part of a campaign, or is incomplete: {e}; make it again with --shard"))
     })?;
     let (theirs, ours) = (runner::version(&reader), env!("CARGO_PKG_VERSION"));
     if theirs != ours {
@@ -163,7 +163,7 @@ fn difference(campaign: &Campaign, theirs: &Source, path: &Path) -> String {
     let pairs = theirs.configurations.iter().zip(&ours.configurations).zip(campaign.system().components());
     let other = pairs.into_iter().find(|((theirs, ours), _)| theirs != ours);
     other.map_or_else(
-        || "its fingerprint is not that of its texts".to_owned(),
+        || "its fingerprint does not match its texts".to_owned(),
         |(_, component)| format!("its component {:?} has another configuration", component.name),
     )
 }

@@ -38,7 +38,7 @@ pub struct Measures {
 struct Seen {
     /// Number of steps by status.
     counts: [u64; Status::ALL.len()],
-    /// Number of steps by standing of its promise.
+    /// Number of steps by status of its guarantee.
     standings: [u64; Standing::ALL.len()],
     /// Largest size by input.
     peaks: Vec<f64>,
@@ -82,10 +82,8 @@ impl Measures {
         let columns = columns(campaign, &filters);
         let mut names = HashSet::new();
         if let Some(twice) = columns.iter().find(|column| !names.insert(column.name.as_str())) {
-            let message = format!(
-                "two columns of a row are called {}; call its barrier or its input otherwise",
-                twice.name
-            );
+            let message =
+                format!("two columns of a row are called {}; rename the barrier or the input", twice.name);
             return Err(Error::configuration("component", message));
         }
         Ok(Self { filters, success: campaign.success(), columns })
@@ -228,9 +226,9 @@ const OF_BARRIER: [(&str, Kind, &str, &str); 10] = [
         "whether the deadline was reached and h >= 0 held from then on; from the start where it began inside",
     ),
     ("late", Kind::Number, "s", "when it was known that its deadline is missed"),
-    ("left", Kind::Number, "s", "when it was left after it had been inside and was to stay so"),
+    ("left", Kind::Number, "s", "when it was left after it had been inside and was to be kept"),
     ("unmet", Kind::Count, "", "samples that did not meet its constraint"),
-    ("longest", Kind::Count, "", "longest row of them"),
+    ("longest", Kind::Count, "", "most of them in a row"),
     ("violation", Kind::Number, "", "largest violation of its constraint, in the unit of its slack"),
     ("kept", Kind::Flag, "", "whether it was on time and inside, and every sample met its constraint"),
 ];
@@ -245,7 +243,7 @@ fn columns(campaign: &Campaign, filters: &[FilterPlan]) -> Vec<Column> {
     for varied in campaign.varied() {
         add(varied.name.clone(), Kind::Number, varied.unit.as_deref().unwrap_or(""), &varied.description);
     }
-    add("success".into(), Kind::Flag, "", "whether the run came to what the campaign asks for");
+    add("success".into(), Kind::Flag, "", "whether the run met what the campaign asks for");
     add("failure".into(), Kind::Text, "", "the call that ended the run before its stop time");
     for filter in filters {
         for status in Status::ALL {
@@ -255,7 +253,7 @@ fn columns(campaign: &Campaign, filters: &[FilterPlan]) -> Vec<Column> {
         }
         for standing in Standing::ALL.into_iter().filter(|_| filter.assured) {
             let name = standing.name();
-            let meaning = format!("communication points at which the promise was {name}");
+            let meaning = format!("communication points at which the guarantee was {name}");
             add(format!("{}.assurance.{name}", filter.component), Kind::Count, "", &meaning);
         }
         for (input, unit) in &filter.inputs {

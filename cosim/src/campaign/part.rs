@@ -73,7 +73,7 @@ impl Part {
         let product = Product::new(parsed(&text).map_err(|e| Error::from(e).in_file(path))?)?;
         if product.guid != fmu.description().token {
             let message = format!(
-                "{} is the work of another version of Punctual (its GUID is {}, must be {}); build it anew",
+                "{} is the work of another version of Punctual (its GUID is {}, must be {}); rebuild it",
                 path.display(),
                 fmu.description().token,
                 product.guid

@@ -139,7 +139,7 @@ pub fn rare(
         splitting::estimate(plan, &found[..repeats])
     else {
         let message = format!(
-            "none of {repeats} repeats came to a failure that the pilot had found; give more, such as --rare={}",
+            "none of {repeats} repeats reached a failure that the pilot had found; give more, such as --rare={}",
             10 * repeats
         );
         return Err(Error::configuration("--rare", message));
@@ -192,7 +192,7 @@ impl Store {
             text => text.map_err(|e| Error::io("read", &self.file, e))?,
         };
         let damaged = || {
-            let message = "it was changed since it was written; remove it, and the estimate begins anew";
+            let message = "it was changed since it was written; remove it, and the estimate starts over";
             Error::io("use", &self.file, io::Error::other(message))
         };
         let (head, made) = text.split_once('\n').ok_or_else(damaged)?;
@@ -238,7 +238,7 @@ fn check(campaign: &Campaign, output: &Path) -> Result<(), Error> {
         return wrong("vary", "is empty, so that all runs are alike");
     }
     if output.exists() {
-        let message = format!("{} is there already; remove it, or give another output", output.display());
+        let message = format!("{} already exists; remove it, or give another output", output.display());
         return wrong("--output", &message);
     }
     Ok(())
@@ -247,10 +247,10 @@ fn check(campaign: &Campaign, output: &Path) -> Result<(), Error> {
 fn stalled(Stalled { margin, part, made }: Stalled) -> Error {
     let way = match margin {
         f64::INFINITY => "no run has an h from a deadline on".to_owned(),
-        _ => format!("the least h that {made} runs came to is {margin}"),
+        _ => format!("the least h that {made} runs reached is {margin}"),
     };
     let message = format!(
-        "found no way to a failure: {way}, at which about {part:.1e} of all runs are. That proves nothing about the rest"
+        "found no path to a failure: {way}, which about {part:.1e} of all runs reach. That proves nothing about the others"
     );
     Error::configuration("--rare", message)
 }

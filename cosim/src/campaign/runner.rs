@@ -300,8 +300,7 @@ pub(super) fn complete(campaign: &Campaign, output: &Path, wanted_runs: &Range<u
         return Ok(false);
     }
     let (reader, _) = recorded(output).map_err(|e| {
-        let message =
-            format!("{} is there already: {e}; remove it, or give another output", output.display());
+        let message = format!("{} already exists: {e}; remove it, or give another output", output.display());
         Error::configuration("--output", message)
     })?;
     let (found, wanted) = (fingerprint(&reader), campaign.source().fingerprint());

@@ -12,7 +12,7 @@
 //!
 //! A move from z proposes √(1 − σ²) z + σ ξ with ξ standard normal, which leaves the standard normal distribution as it
 //! is, and is made where g ≤ L stays true: I. Papaioannou, W. Betz, K. Zwirglmaier and D. Straub, Probab. Eng. Mech. 41
-//! (2015), doi 10.1016/j.probengmech.2015.06.006. Each seed, of one piece of the noise of a run, is drawn anew with the
+//! (2015), doi 10.1016/j.probengmech.2015.06.006. Each seed, of one piece of the noise of a run, is drawn again with the
 //! probability σ² and stays otherwise, which leaves independent seeds as they are too.
 
 use std::f64::consts::TAU;

@@ -275,7 +275,7 @@ impl Reader {
     pub fn open(path: &Path) -> Result<Self, Error> {
         let file = File::open(path).map_err(|e| Error::io("read", path, e))?;
         let inner = SerializedFileReader::new(file).map_err(|e| {
-            let message = format!("it is no Parquet file, or only half of one ({e})");
+            let message = format!("it is not a Parquet file, or is incomplete ({e})");
             Error::io("read", path, std::io::Error::other(message))
         })?;
         Ok(Self { path: path.to_owned(), inner })

@@ -1,4 +1,4 @@
-//! A filter's file as a system: the filter, the plant that its model is, and the nominal controller that stands in it.
+//! A filter's file as a system: the filter, the plant that its model is, and the nominal controller that is in it.
 
 use punctual_fmu::configuration::Configuration;
 

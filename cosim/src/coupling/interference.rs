@@ -180,7 +180,7 @@ impl Watched {
         let (mut far, mut is_changed) = (0.0_f64, false);
         for (pair, wanted) in self.pairs.iter().zip(&wanted) {
             let by = (values[pair.given] - wanted).abs();
-            // Not-a-number was not wanted.
+            // NaN was not wanted.
             if by <= SAME * (1.0 + wanted.abs()) {
                 continue;
             }

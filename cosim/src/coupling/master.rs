@@ -133,7 +133,7 @@ pub struct Simulation<P = Box<dyn Participant>> {
     stop: Option<Arc<AtomicBool>>,
 }
 
-/// The values of a Real input or tunable parameter in the course of a run, each for as many steps.
+/// The sequence of values of a Real input or tunable parameter in a run, each for as many steps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Course {
     /// Position of the component.
@@ -352,7 +352,7 @@ impl<P: Participant> Simulation<P> {
         }
     }
 
-    /// Gives Real inputs and tunable parameters courses of values, from the next run on, in place of any before.
+    /// Gives Real inputs and tunable parameters sequences of values, from the next run on, in place of any before.
     pub fn set_courses(&mut self, courses: Vec<Course>) {
         for course in &courses {
             if let Some(first) = course.values.first() {
@@ -362,7 +362,7 @@ impl<P: Participant> Simulation<P> {
         self.courses = courses;
     }
 
-    /// Sets the values of the courses that begin at point `k`.
+    /// Sets the values of the sequences that begin at point `k`.
     fn change(&mut self, k: u64) -> Result<(), Error> {
         for Course { component, reference, steps, values } in &self.courses {
             let next = usize::try_from(k / steps).ok().filter(|_| k.is_multiple_of(*steps));
@@ -525,7 +525,7 @@ impl<P: Participant> Simulation<P> {
         Ok(())
     }
 
-    /// Whether an FMU asked for the end of the run in the step to point `k`; told in a note.
+    /// Whether an FMU asked for the end of the run in the step to point `k`; reported in a note.
     fn is_ended(&mut self, k: u64) -> bool {
         let asking = self.members.iter().position(|member| member.participant.asks_to_end());
         asking.inspect(|c| self.note_end(*c, k)).is_some()

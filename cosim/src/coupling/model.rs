@@ -128,7 +128,7 @@ impl Model {
         let (fmu, beside) = (fmu.path().display(), beside.display());
         (inside != outside).then(|| {
             format!(
-                "note: {fmu} is not made of {beside} as that is now; build it anew, or name the .toml file in the system"
+                "note: {fmu} was not built from the current {beside}; rebuild it, or name the .toml file in the system"
             )
         })
     }

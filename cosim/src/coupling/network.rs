@@ -124,7 +124,7 @@ pub fn unit_notes(system: &System, descriptions: &[&Description], links: &[Link]
                 format!("{from} ({given}) → {to} ({taken})"),
             ),
             Units::Overruled(by) => (
-                "a factor of the file stands, though the units make another one",
+                "the factor of the file is used, although the units give another one",
                 String::new(),
                 format!("{from} ({given}) → {to} ({taken}) has {}, not {}", brief(link.factor), brief(by)),
             ),
@@ -540,7 +540,7 @@ impl<'a> Resolver<'a> {
         let unknown = links.iter().filter(|link| is_unknown(self.variable(link.from)));
         let note = |link: &Link| {
             let (from, to) = (self.name(link.from), self.name(link.to));
-            format!("{from} is no output, so it is not read during the initialisation: {to} gets 0 there")
+            format!("{from} is not an output, so it is not read during the initialisation: {to} gets 0 there")
         };
         unknown.map(note).collect()
     }

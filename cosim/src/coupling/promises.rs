@@ -225,7 +225,7 @@ impl Zeros {
         let (first, last, moved) = (self.first?, self.last?, self.moved?);
         let (time, x) = self.after.as_ref()?;
         let far = x.iter().fold(0.0, |far: f64, x| far.max(x.abs()));
-        // Not-a-number is no jump.
+        // NaN is no jump.
         let jumps = self.counted && far > Self::JUMP * moved;
         jumps.then(|| {
             format!(

@@ -656,7 +656,11 @@ signals = ["a.y"]
                 "component[1].tolerance: is NaN; must be finite and > 0",
             ),
             ("step = 0.5", "step = 1e-30", "experiment.step: is 1e-30 s, which makes"),
-            ("step = 0.5", "step = 0.5\nsteps = 1", "experiment.steps: is no key here (did you mean step?)"),
+            (
+                "step = 0.5",
+                "step = 0.5\nsteps = 1",
+                "experiment.steps: is not a key here (did you mean step?)",
+            ),
             (
                 "step = 0.5",
                 "step = 0.5\norder = \"random\"",

@@ -140,7 +140,7 @@ impl Archive {
             let folder = entry.trim_end_matches(MODEL_DESCRIPTION);
             let text = format!(
                 "is not at the top of the archive, but in {folder}: an FMU holds what is in that folder, without the \
-                 folder; archive it anew from inside"
+                 folder; archive it again from inside"
             );
             return Err(FmuProblem::Description(text));
         }
@@ -224,11 +224,11 @@ fn limit(what: &'static str, value: u64, unit: &'static str, allowed: u64) -> Re
 }
 
 /// Refuses a file whose end announces too many entries, before memory is taken for them. (The plain form counts
-/// in 16 bits; a larger count stands in a record of its own.)
+/// in 16 bits; a larger count is in a separate record.)
 fn announced_entries(file: &mut File) -> Result<(), FmuProblem> {
     let io = |e: io::Error| FmuProblem::Archive(e.to_string());
     let length = file.seek(SeekFrom::End(0)).map_err(io)?;
-    // The last record is 22 bytes and a comment of at most 65535; the large records stand before it.
+    // The last record is 22 bytes and a comment of at most 65535; the large records come before it.
     let tail = length.min(22 + 65_535 + 20 + 56);
     file.seek(SeekFrom::Start(length - tail)).map_err(io)?;
     let mut bytes = Vec::new();
@@ -315,7 +315,7 @@ fn compression(method: CompressionMethod) -> String {
         (CompressionMethod::XZ, "xz"),
     ];
     let known = NAMES.iter().find(|(known, _)| *known == method);
-    known.map_or_else(|| format!("a method of its own, {method:?}"), |(_, name)| (*name).to_owned())
+    known.map_or_else(|| format!("an unknown method, {method:?}"), |(_, name)| (*name).to_owned())
 }
 
 /// Writes one entry below `folder`, and no more bytes than the archive announced for it.

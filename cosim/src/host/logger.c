@@ -1,4 +1,4 @@
-/* What an FMU hands over by address: texts, and the arguments of the fmi2CallbackLogger. Nothing of it is trusted. Any
+/* What an FMU passes by address: texts, and the arguments of the fmi2CallbackLogger. Nothing of it is trusted. Any
  * argument may be NULL or an address that cannot be read, and any status may come. So bytes are copied by the system,
  * which refuses where a plain read would crash, and the component environment is passed on as a number (see logging.rs). */
 #define _GNU_SOURCE

@@ -1,7 +1,7 @@
 //! Log messages of an FMU: the callbacks handed to it when it is instantiated, and the last messages kept for error
 //! texts. Knows nothing of calls and their order.
 //!
-//! What an FMU hands over is not trusted. The component environment is looked up among those given out, never followed, and
+//! What an FMU passes is not trusted. The component environment is looked up among those given out, never followed, and
 //! texts are copied by `logger.c`, which survives an address that cannot be read.
 
 use std::cell::Cell;

@@ -110,7 +110,7 @@ pub trait Participant {
         None
     }
 
-    /// Reads the numbers at `places`, which it told.
+    /// Reads the numbers at `places`, which it reported.
     ///
     /// # Errors
     ///
@@ -119,7 +119,7 @@ pub trait Participant {
         Err(Error::broken(self.name(), "tells no places to read"))
     }
 
-    /// Writes numbers to `places`, which it told as those of inputs.
+    /// Writes numbers to `places`, which it reported as those of inputs.
     ///
     /// # Errors
     ///
@@ -293,7 +293,7 @@ impl Participant for Box<dyn Participant> {
     }
 }
 
-/// An instance of an FMU of others, made anew for every run: what a reset forgets differs from FMU to FMU.
+/// An instance of an FMU of others, made again for every run: what a reset forgets differs from FMU to FMU.
 pub struct Anew {
     fmu: Rc<Fmu>,
     description: Rc<Description>,

@@ -7,7 +7,7 @@ use roxmltree::{Attribute, Document, Node};
 const ROOT: &str = "fmiModelDescription";
 /// The attribute of the root in which two builds of the same model may differ.
 const TIME: &str = "generationDateAndTime";
-/// The most characters of a value that are told.
+/// The most characters of a value that are shown.
 const SHOWN: usize = 60;
 
 /// A model description of FMI 2.0, parsed.

@@ -39,7 +39,7 @@ const LICENCE: (&str, &str) = (
 /// The picture that importers show.
 const ICON: &[u8] = include_bytes!("model.png");
 
-/// Reads a configuration file and completes it. A plug-in is tried in a process of its own before it is loaded
+/// Reads a configuration file and completes it. A plug-in is tried in a separate process before it is loaded
 /// here.
 ///
 /// # Errors

@@ -48,7 +48,7 @@ impl PluginLoader for Tried<'_> {
         if let End::Broken { how, last } = tried().map_err(|e| e.to_string())? {
             let place = last.map_or_else(String::new, |last| format!(" in {}", last.call));
             let file = plugin_file_name(name);
-            return Err(format!("{file} {how}{place}, when it was tried in a process of its own"));
+            return Err(format!("{file} {how}{place}, when it was tried in a separate process"));
         }
         self.folder.load(name)
     }

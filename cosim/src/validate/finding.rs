@@ -161,7 +161,7 @@ pub(super) const DESCRIPTION: &str = "modelDescription.xml";
 /// Findings while they are collected.
 #[derive(Debug, Default)]
 pub(super) struct Findings {
-    /// The entry that is read, in which marks stand.
+    /// The entry that is read, in which there are marks.
     file: String,
     /// The beginnings of its lines, in bytes.
     lines: Vec<usize>,
@@ -170,7 +170,7 @@ pub(super) struct Findings {
 }
 
 impl Findings {
-    /// Takes the text of an entry, in which marks stand from now on.
+    /// Takes the text of an entry, in which there are marks from now on.
     pub(super) fn read(&mut self, file: &str, text: &str) {
         file.clone_into(&mut self.file);
         let breaks = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n');

@@ -3,7 +3,7 @@
 //!
 //! | module | asks |
 //! |---|---|
-//! | `finding` | how a finding is told |
+//! | `finding` | how a finding is reported |
 //! | `schema` | what the XML schemas say: elements, attributes, types of values |
 //! | `model` | what the description of either version says |
 //! | `layout` | which files the archive must and may hold |

@@ -69,7 +69,7 @@ impl Model {
                 let exchange =
                     model.description.model_exchange.as_ref().map(|of| of.model_identifier.as_str());
                 let mut names: Vec<&str> = model.model_identifier().into_iter().collect();
-                // What is no identifier is told as such.
+                // What is no identifier is reported as such.
                 names.extend(exchange.filter(|name| is_c_identifier(name) && !names.contains(name)));
                 names
             }
@@ -77,7 +77,7 @@ impl Model {
                 let mut names: Vec<&str> = Vec::new();
                 for (_, interface) in model.description.interfaces() {
                     let name = interface.model_identifier.as_str();
-                    // What is no identifier is told as such.
+                    // What is no identifier is reported as such.
                     if is_c_identifier(name) && !names.contains(&name) {
                         names.push(name);
                     }

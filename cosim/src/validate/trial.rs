@@ -150,7 +150,7 @@ struct Trial {
     file: File,
     /// The time that the trial may take.
     limit: Duration,
-    /// Rule and variable of the findings told: the same finding at every step teaches nothing.
+    /// Rule and variable of the findings reported: the same finding at every step teaches nothing.
     told: HashSet<(&'static str, Option<String>)>,
 }
 

@@ -82,7 +82,7 @@ pub struct CallbackFunctions {
     pub allocate_memory: Option<unsafe extern "C" fn(usize, usize) -> *mut c_void>,
     /// `free`.
     pub free_memory: Option<unsafe extern "C" fn(*mut c_void)>,
-    /// Told at the end of an asynchronous step.
+    /// Called at the end of an asynchronous step.
     pub step_finished: Option<unsafe extern "C" fn(Environment, Status)>,
     /// Handed back to `logger`.
     pub environment: Environment,

@@ -52,7 +52,9 @@ impl States {
                 FmiVersion::Two => "fmi2GetFMUstate or fmi2DeSerializeFMUstate",
                 FmiVersion::Three => "fmi3GetFMUState or fmi3DeserializeFMUState",
             };
-            format!("FMUstate is none that {functions} gave, or was freed, or the instance that made it was")
+            format!(
+                "FMUstate was not returned by {functions}, or was freed, or the instance that made it was"
+            )
         })?;
         let (found, wanted) = (&entry.state.guid, &handle.instance.product().guid);
         if found != wanted {

@@ -19,7 +19,7 @@ pub(super) struct FilterBlock {
     filter: Filter,
     /// `rearm` at the last step: a rising edge re-arms.
     rearm_seen: bool,
-    /// The standing of the promise that was last spoken of.
+    /// The status of the guarantee that was last logged.
     noticed: Option<Standing>,
     /// Scratch: the state to go back to after looking ahead over a re-arming.
     kept: FilterState,
@@ -77,7 +77,7 @@ impl FilterBlock {
         if self.filter.counts_holds() { self.filter.expect_hold(Some(hold)) } else { Ok(()) }
     }
 
-    /// Where the promise stands, where plans are followed. They are not where a parameter that was set since asks for what
+    /// Status of the guarantee, where plans are followed. They are not where a parameter that was set since asks for what
     /// none accounts for.
     fn standing(&self) -> Option<(Standing, Option<Failure>)> {
         let refused = (Standing::Refused, None);
@@ -99,7 +99,7 @@ impl FilterBlock {
         self.after_barriers() + of_plans + usize::from(self.configuration.ends_plans())
     }
 
-    /// Writes where the promise stands, why u_ref was changed, and at `t` until when the promise stands.
+    /// Writes the status of the guarantee, why u_ref was changed, and at `t` until when the guarantee holds.
     fn write_standing(&self, standing: Standing, t: f64, values: &mut Values) {
         let at = self.after_barriers();
         values.integers[at] = standing as i32;
@@ -203,7 +203,7 @@ impl Block for FilterBlock {
         let mut at = self.layout.outputs;
         let inputs = self.layout.inputs;
         derivative[at..][..inputs].copy_from_slice(&self.change.u[..inputs]);
-        // The output `status` stands in between.
+        // The output `status` is in between.
         at += inputs + 1;
         for b in &self.change.barriers {
             for (i, output) in (at..).zip(&BARRIER_OUTPUTS) {
@@ -244,7 +244,7 @@ impl Block for FilterBlock {
             return None;
         }
         if standing == Standing::Assured && before.is_some_and(|before| !stands(before)) {
-            return Some("the promise is assured again: a plan keeps it from here".to_owned());
+            return Some("the guarantee is regained: a plan keeps the promise from here".to_owned());
         }
         (!stands(standing)).then(|| {
             let why = match failure {
@@ -253,7 +253,7 @@ impl Block for FilterBlock {
                 None => self.configuration.unaccounted(),
             };
             let why = why.map(|why| format!(": {why}")).unwrap_or_default();
-            format!("the promise is {} ({}){why}", standing.name(), standing.meaning())
+            format!("the guarantee is {} ({}){why}", standing.name(), standing.meaning())
         })
     }
 

@@ -17,7 +17,7 @@ pub(super) struct PlantBlock {
     parameters: Vec<Parameter<PlantConfiguration>>,
     layout: Layout,
     plant: Box<dyn DynPlant>,
-    /// What is told beside the states, if anything is.
+    /// What is output beside the states, if anything is.
     outputs: Option<Functions<f64>>,
     disturbance: Disturbance,
     /// Place of the disturbance's seed among the parameters: it may change in a run.

@@ -28,7 +28,7 @@ pub(super) enum Uneven<'a> {
     Refused,
     /// They are taken: plans use every input.
     Taken,
-    /// They are taken, and told by their index with what was found.
+    /// They are taken, and reported by their index with what was found.
     Told(&'a mut Vec<(usize, RelativeDegree)>),
 }
 

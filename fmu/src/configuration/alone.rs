@@ -1,4 +1,4 @@
-//! A run of a filter's file alone: the plant, the start and the nominal controller that stand in it.
+//! A run of a filter's file alone: the plant, the start and the nominal controller that are in it.
 
 use std::collections::BTreeMap;
 
@@ -89,7 +89,7 @@ impl FilterConfiguration {
     }
 }
 
-/// `error` about a part of the table `section` that stands in place of `plant`.
+/// `error` about a part of the table `section` that replaces `plant`.
 pub(super) fn within(section: &str, error: &ConfigurationError) -> ConfigurationError {
     let field = error.field().strip_prefix("plant").unwrap_or(error.field());
     ConfigurationError::new(format!("{section}{field}"), error.message())

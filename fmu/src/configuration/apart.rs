@@ -151,7 +151,7 @@ impl FilterConfiguration {
     /// Why a promise is refused at the start, in words: that no plan was found, or that there can be none.
     pub fn refusal(&self, failure: Failure) -> String {
         let found = match failure {
-            Failure::Broken { .. } => format!("by the nearest way tried, {}", self.failure(failure)),
+            Failure::Broken { .. } => format!("in the closest attempt, {}", self.failure(failure)),
             _ => self.failure(failure),
         };
         let inputs = self.commanded();

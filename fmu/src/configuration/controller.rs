@@ -212,7 +212,7 @@ pub(super) enum ControllerKind {
     Controller,
 }
 
-/// A controller as it stands in a file: the keys of every kind.
+/// A controller as written in a file: the keys of every kind.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawController {

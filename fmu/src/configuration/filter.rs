@@ -80,7 +80,7 @@ pub(super) enum FilterKind {
 /// The largest budget of a search.
 const MOST_PROGRAMS: u64 = 1_000_000;
 
-/// A filter as it stands in a file.
+/// A filter as written in a file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawFilter {
@@ -135,15 +135,15 @@ pub struct FilterConfiguration {
     /// Whether the filter promises only what a plan keeps.
     #[serde(skip_serializing_if = "is_auto")]
     pub assurance: AssuranceName,
-    /// The time in s, > 0, for which a plan has to reach past the last deadline and the sample where none ends at rest; `None`:
-    /// every plan has to end at rest.
+    /// The time in s, > 0, for which a plan has to reach past the last deadline and the sample where none ends at an
+    /// equilibrium; `None`: every plan has to end at an equilibrium.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plan_horizon: Option<f64>,
     /// The most quadratic programs of a search for a plan at one sample after the first, ≥ 1; `None`:
     /// [`Plans::SEARCH_BUDGET`](punctual_core::filter::Plans::SEARCH_BUDGET).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub search_budget: Option<u32>,
-    /// Why no plan is followed, as the file stands; `None` where plans are.
+    /// Why no plan is followed, with the file as it is; `None` where plans are.
     #[serde(skip)]
     rows_only: Option<RowsOnly>,
     /// Time in s until a computed input acts, ≥ 0, at most the step size: a communication step with a
@@ -233,26 +233,26 @@ pub(super) static SECTION: Section = Section {
                 Word(AssuranceName::WORDS),
                 Some("`auto`"),
                 "`on`: the filter promises only what a plan within the bounds keeps, whatever u_ref is, and follows it where it \
-                 must ([guarantees](guarantees.md#will-it-always)). The plan is sought at the first step; none found: no \
-                 promise. Needs a model to run ahead, sets that stay where they are, no delay, no errors. `off`: the rows \
+                 must ([guarantees](guarantees.md#will-it-always)). The plan is sought at the first step; if none is found, \
+                 nothing is promised. Needs a model to run ahead, sets that stay where they are, no delay, no errors. `off`: the rows \
                  alone. `auto`: `on` where that is possible and every input has bounds, else `off`. Where every input has bounds, a \
                  warning names the keys that switch it off for all barriers",
             ),
             Key::new(
                 "plan_horizon",
                 Number(Is("s"), Range::POSITIVE),
-                Some("none: every plan ends at rest"),
-                "where no plan ends at rest, such as of an aeroplane or in a set that moves for ever: how far one has to reach \
-                 past the last deadline and the present, to be promised until its end, `assured_until`. It is prolonged before \
-                 it ends, if a plan is found",
+                Some("none: every plan ends at an equilibrium"),
+                "if no plan ends at an equilibrium, as for an aeroplane or a set that moves for ever: how far a plan has to reach \
+                 past the last deadline and the present. The promise holds until its end, `assured_until`. It is extended before it ends, if a \
+                 longer plan is found",
             ),
             Key::new(
                 "search_budget",
                 Count(1, MOST_PROGRAMS),
                 Some("3 where plans are followed"),
-                "the most quadratic programs of a search for a plan at one step after the first; it goes on at the next step, while \
-                 the plan at hand drives. More find a way for u_ref, or a lost plan again, in fewer steps, each of which may \
-                 take longer: about 0.3 ms each for a vehicle, the time growing with states, inputs and barriers",
+                "the most quadratic programs that a search for a plan solves at one step after the first; it continues at the next \
+                 step, and meanwhile the current plan drives. With more, a plan for u_ref, or one in place of a lost plan, is found in fewer steps, \
+                 each of which may take longer: about 0.3 ms per program for a vehicle, and more with more states, inputs and barriers",
             ),
             Key::new(
                 "actuation_delay",
@@ -265,15 +265,15 @@ pub(super) static SECTION: Section = Section {
                 "period_max",
                 Number(Is("s"), Range::NON_NEGATIVE),
                 Some("0"),
-                "the longest time between two steps; the rows then hold for steps of any length up to it, and a plan \
-                 seldom ends at one. 0: as long as the ones before were",
+                "the longest time between two steps; the rows then hold for steps of any length up to it, and a late \
+                 step seldom ends a plan. 0: as long as the previous ones",
             ),
             Key::new(
                 "arm_after",
                 Number(Is("s"), Range::NON_NEGATIVE),
                 Some("0: at the first step"),
                 "the time from the first step until the filter is [armed](fmu.md#arming): every deadline counts from the first \
-                 step with valid inputs then. Before, nothing is asked or promised, and u is u_ref within its bounds",
+                 step with valid inputs then. Until then nothing is required or promised, and u is u_ref within its bounds",
             ),
             Key::new(
                 "measurement_errors",
@@ -292,8 +292,8 @@ pub(super) static SECTION: Section = Section {
                 "policy",
                 TextByName,
                 Some("none"),
-                "for each input of the model the [expression](#expressions) of a controller that may keep the promises, of \
-                 states, parameters and `t`: a search for a plan begins with it too. Nothing rests on it",
+                "for each input of the model the [expression](#expressions) of a controller that may keep the promises, in \
+                 states, parameters and `t`: a search for a plan starts from it too. No guarantee depends on it",
             ),
             Key::new(
                 "direct_feedthrough",
@@ -664,7 +664,7 @@ impl FilterConfiguration {
         self.rows_only.is_none()
     }
 
-    /// Whether its plans may end without a rest, so that it tells until when it promises.
+    /// Whether its plans may end in motion, so that it reports until when it promises.
     pub fn ends_plans(&self) -> bool {
         self.is_assured() && self.plan_horizon.is_some()
     }
@@ -723,7 +723,7 @@ impl FilterConfiguration {
     /// What keeps a plan from being one, in words.
     pub fn failure(&self, failure: Failure) -> String {
         match (failure, self.plan_horizon) {
-            (Failure::NoRest, None) => format!("{failure}; with `plan_horizon` a plan may end before"),
+            (Failure::NoRest, None) => format!("{failure}; with `plan_horizon` a plan may end in motion"),
             (Failure::NoRest, Some(_)) => "no plan reaches as far as plan_horizon".to_owned(),
             _ => failure.named(self).to_string(),
         }

@@ -61,7 +61,7 @@ pub(super) static SECTION: Section = Section {
                 "gain",
                 Number(Is("1/s"), GAIN),
                 Some("2"),
-                "how fast it follows `u_ref.<state>` where nothing is in the way",
+                "how fast it follows `u_ref.<state>` if no constraint interferes",
             ),
             Key::new("min", Number(Of("in its unit"), LIMIT), Some("none"), "its smallest value"),
             Key::new("max", Number(Of("in its unit"), LIMIT), Some("none"), "its largest value"),
@@ -218,7 +218,10 @@ impl FilterConfiguration {
         let mut found = Vec::new();
         let follows = self.barrier_inputs();
         if let Some(input) = follows.first() {
-            found.push(format!("a barrier follows {}, which others move and no plan foresees", input.name));
+            found.push(format!(
+                "a barrier follows {}, which is moved from outside, so that no plan can predict it",
+                input.name
+            ));
         }
         for error in filter.obstacles(&self.plans()) {
             let (field, message) = (error.field(), error.message());
@@ -232,7 +235,7 @@ impl FilterConfiguration {
                     errors.map(|(state, error)| format!("{field}.{state} is {error}, must be 0 for a plan")),
                 );
             } else if let Some((name, after)) = of("begin").and_then(|b| Some((&b.name, b.after.as_ref()?))) {
-                found.push(format!("{name}.after is {after:?}, and no plan foresees when that is reached"));
+                found.push(format!("{name}.after is {after:?}, and no plan predicts when that is reached"));
             } else if let Some(barrier) = of("source") {
                 // No key has this name. What follows another thing moves as that does; what moves by itself wants the key of a
                 // horizon.

@@ -86,7 +86,7 @@ impl From<&Signal> for VariableSection {
     }
 }
 
-/// `[plant]` of a filter or plant as it stands in a file: the keys of every kind of plant.
+/// `[plant]` of a filter or plant as written in a file: the keys of every kind of plant.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawModel {
@@ -171,7 +171,7 @@ pub(super) static PLANT: Section = Section {
                 "plugin_digest",
                 TextOrByName,
                 Some("any"),
-                "what its bytes must come to: a text, or one for each platform",
+                "the expected digest of its bytes: a text, or one for each platform",
             ),
         ];
         KEYS.iter().collect()
@@ -194,8 +194,8 @@ pub(super) static VARIABLE: Section = Section {
                 "min",
                 Number(Of("in its unit"), Range::FINITE),
                 Some("none"),
-                "of a state: where the model is meant, and the relative degree looked for; of an input: its bound where \
-                 `[bounds]` says nothing",
+                "of a state: the range for which the model is meant, and in which the relative degree is determined; of \
+                 an input: its bound if `[bounds]` gives none",
             ),
             Key::new("max", Number(Of("in its unit"), Range::FINITE), Some("none"), "the same from above"),
         ];
@@ -351,7 +351,7 @@ impl PlantSection {
         }
     }
 
-    /// The name in messages: that of the reference plant, or the kind of model that stands in its place.
+    /// The name in messages: that of the reference plant, or the kind of model in its place.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Reference(reference) => reference.model.name(),
@@ -450,7 +450,7 @@ impl PlantSection {
             .map_err(|e| ConfigurationError::new(format!("plant.{}", e.field()), e.message()))
     }
 
-    /// The values of an expression for each input, which stand in the table `field` by name, in the order of the inputs.
+    /// The values of an expression for each input, which are in the table `field` by name, in the order of the inputs.
     ///
     /// # Errors
     ///

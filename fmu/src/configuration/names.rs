@@ -7,7 +7,7 @@ use punctual_models::nearest;
 
 use super::{ConfigurationError, VariableSection};
 
-/// Longest name that can stand in variable names and file names.
+/// Longest name that can be used in variable names and file names.
 const LONGEST: usize = 64;
 
 /// Refuses a name that is no C identifier of at most 64 characters, by the path of its field.

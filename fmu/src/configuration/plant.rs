@@ -38,7 +38,7 @@ pub(super) static SECTION: Section = Section {
                 Some("0, or nearest to it in the state's range"),
                 "initial value of a state, by name",
             ),
-            Key::new("output", Tables(&OUTPUT), Some("none"), "what else the FMU tells beside its states"),
+            Key::new("output", Tables(&OUTPUT), Some("none"), "further outputs of the FMU beside its states"),
             Key::new("integration", Table(&INTEGRATION), Some(""), "how it is integrated"),
             Key::new("disturbance", Table(&DISTURBANCE), Some("none"), "what the model does not say"),
             Key::new("experiment", Table(&EXPERIMENT), Some(""), "[the run it is meant for](#runs)"),
@@ -192,7 +192,7 @@ pub(super) enum PlantKind {
     Plant,
 }
 
-/// A plant as it stands in a file.
+/// A plant as written in a file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawPlant {

@@ -272,13 +272,13 @@ fn merged_parameters(
             let names: Vec<_> = theirs.iter().map(|p| p.name.as_str()).collect();
             let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
             let message = format!(
-                "is {:?}, which is no parameter of the plug-in; its parameters are {names}",
+                "is {:?}, which is not a parameter of the plug-in; its parameters are {names}",
                 given.name
             );
             return Err(ConfigurationError::new(format!("{path}.name"), message));
         };
         if own[..i].iter().any(|other| other.name == given.name) {
-            let message = format!("is {:?}, which stands there twice", given.name);
+            let message = format!("is {:?}, which is given twice", given.name);
             return Err(ConfigurationError::new(format!("{path}.name"), message));
         }
         if given.unit != "1" {

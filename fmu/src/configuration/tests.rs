@@ -274,19 +274,19 @@ fn unknown_and_missing_keys_and_wrong_types() {
             FILTER,
             "radius = 2.0",
             "radius = 2.0\nradus = 1.0",
-            "barrier[0].radus: is no key here (did you mean radius?) (line 9)",
+            "barrier[0].radus: is not a key here (did you mean radius?) (line 9)",
         ),
         (
             FILTER,
             "[[barrier]]",
             "[experiment]\nstep = 1.0\n[[barrier]]",
-            "experiment.step: is no key here (did you mean step_size?) (line 6)",
+            "experiment.step: is not a key here (did you mean step_size?) (line 6)",
         ),
         (
             FILTER,
             "[[barrier]]",
             "[experiment]\nwhen = 1.0\n[[barrier]]",
-            "experiment.when: is no key here; the keys are start_time, stop_time, step_size, fmi, arrays (line 6)",
+            "experiment.when: is not a key here; the keys are start_time, stop_time, step_size, fmi, arrays (line 6)",
         ),
         (FILTER, "radius = 2.0", "", "barrier[0].radius: missing, disc needs it"),
         (FILTER, "name = \"goal\"", "", "barrier[0].name: missing, it must be given (line 5)"),
@@ -386,7 +386,7 @@ fn unknown_and_missing_keys_and_wrong_types() {
             PLANT,
             "inner_step = 0.01",
             "inner_stpe = 0.01",
-            "integration.inner_stpe: is no key here (did you mean inner_step?) (line 6)",
+            "integration.inner_stpe: is not a key here (did you mean inner_step?) (line 6)",
         ),
         (
             HEADING,
@@ -401,7 +401,12 @@ fn unknown_and_missing_keys_and_wrong_types() {
             "points = [[4.0, 3.0, 1.0]",
             "points[0]: has 3 entries, must have 2 (line 4)",
         ),
-        (WAYPOINTS, "points = [[4", "pionts = [[4", "pionts: is no key here (did you mean points?) (line 4)"),
+        (
+            WAYPOINTS,
+            "points = [[4",
+            "pionts = [[4",
+            "pionts: is not a key here (did you mean points?) (line 4)",
+        ),
         (PLANT, "kind", "knd", "kind: missing, must be \"filter\", \"plant\" or \"controller\""),
     ] {
         assert_eq!(refusal(valid, from, to), wanted, "{to:?}");

@@ -159,7 +159,7 @@ impl Instance {
         let variables = self.product.variables.get(item.scalars.clone());
         let outputs = variables.filter(|v| v.iter().all(|v| v.causality == Causality::Output));
         let Some(outputs) = outputs else {
-            return Err(format!("{} is no output, so that its dependencies are not told", item.name));
+            return Err(format!("{} is not an output, so its dependencies are not reported", item.name));
         };
         Ok(outputs.iter().enumerate().flat_map(move |(k, output)| {
             let told =

@@ -32,7 +32,7 @@ impl Instance {
         }
     }
 
-    /// Reads the numbers at `places`, which it told itself. A boolean is 0 or 1.
+    /// Reads the numbers at `places`, which it reported itself. A boolean is 0 or 1.
     ///
     /// # Errors
     ///
@@ -52,7 +52,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Writes numbers to `places`, which it told itself as those of inputs. What is 0 as a whole number is false.
+    /// Writes numbers to `places`, which it reported itself as those of inputs. What is 0 as a whole number is false.
     ///
     /// # Errors
     ///

@@ -37,7 +37,7 @@ pub const BARRIER_OUTPUTS: [BarrierOutput; 14] = [
     },
     BarrierOutput {
         name: "profile",
-        description: "lower bound on h that is promised now",
+        description: "lower bound on h promised now",
         reading: Real(OfH, |b| b.profile, |d| d.profile),
     },
     BarrierOutput {
@@ -53,7 +53,7 @@ pub const BARRIER_OUTPUTS: [BarrierOutput; 14] = [
     },
     BarrierOutput {
         name: "margin_used",
-        description: "h to arrive and stay above: the parameter or what plans need, and what held inputs are expected to cost",
+        description: "h to reach and to stay above: the parameter or what plans need, plus the expected loss from held inputs",
         reading: Real(OfH, |b| b.margin, |d| d.margin),
     },
     BarrierOutput {
@@ -68,13 +68,13 @@ pub const BARRIER_OUTPUTS: [BarrierOutput; 14] = [
     },
     BarrierOutput {
         name: "postponed",
-        description: "how often a deadline that is lost was given up for a later one",
+        description: "how often a lost deadline was replaced by a later one",
         reading: Count(|b| b.postponed),
     },
     BarrierOutput { name: "arrived", description: "h >= 0 has been reached", reading: Flag(|b| b.arrived) },
     BarrierOutput {
         name: "guaranteed",
-        description: "a plan in hand keeps the promise whatever u_ref is; where the filter follows plans",
+        description: "a backup plan keeps the promise, whatever u_ref is; only if the filter follows plans",
         reading: Flag(|b| b.guaranteed),
     },
     BarrierOutput {
@@ -89,8 +89,8 @@ pub const BARRIER_OUTPUTS: [BarrierOutput; 14] = [
     },
     BarrierOutput {
         name: "deadlocked",
-        description: "other barriers block the way, and h does not rise: needs another u_ref",
+        description: "blocked by other barriers, and h does not rise: needs another u_ref",
         reading: Flag(|b| b.deadlocked),
     },
-    BarrierOutput { name: "phase", description: "where the barrier stands", reading: Phase },
+    BarrierOutput { name: "phase", description: "phase of the barrier's promise", reading: Phase },
 ];

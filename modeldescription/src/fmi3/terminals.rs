@@ -132,7 +132,7 @@ impl Terminals {
     ///
     /// - A rule of [`RULES`](crate::RULES) on terminals is broken: names that are used twice, members that name no
     ///   variable that can be connected, or members without the name that the matching rule goes by.
-    /// - There is no terminal, or one lies in a terminal that does not stand before it.
+    /// - There is no terminal, or one lies in a terminal that does not come before it.
     /// - A required text is empty, a text has a character that XML 1.0 cannot carry, or a text of one
     ///   line has a line break or tab.
     pub fn to_xml(&self, description: &ModelDescription) -> Result<String, Error> {

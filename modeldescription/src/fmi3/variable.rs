@@ -156,7 +156,7 @@ pub enum IntervalVariability {
     Fixed,
     /// Changed by tunable parameters.
     Tunable,
-    /// Given anew at each tick.
+    /// Given again at each tick.
     Changing,
     /// Given at some events, as the time to the next tick.
     Countdown,

@@ -178,7 +178,7 @@ fn joined<T: Display>(values: &[T]) -> String {
     values.iter().map(T::to_string).collect::<Vec<_>>().join(" ")
 }
 
-/// The start values that stand in one attribute.
+/// The start values that are in one attribute.
 fn starts<T>(values: &[T], word: impl Fn(&T) -> String) -> Option<String> {
     container(values, |values| values.iter().map(word).collect::<Vec<_>>().join(" "))
 }
@@ -236,7 +236,7 @@ impl VariableKind {
         }
     }
 
-    /// Writes the start values that stand in an attribute.
+    /// Writes the start values that are in an attribute.
     fn start_attribute<E: SerializeStruct>(&self, element: &mut E) -> Result<(), E::Error> {
         let text = match (self, self.as_float(), self.as_integer()) {
             (Self::Boolean(of), ..) => starts(&of.start, bool::to_string),
@@ -247,7 +247,7 @@ impl VariableKind {
         optional(element, "@start", text)
     }
 
-    /// Writes the start values that stand in elements of their own.
+    /// Writes the start values that are in separate elements.
     fn start_elements<E: SerializeStruct>(&self, element: &mut E) -> Result<(), E::Error> {
         #[derive(Serialize)]
         struct Start<T> {

@@ -6,7 +6,7 @@
 //! attributes may be no values of their type at all. The model has nothing in their place, and rules that need
 //! them are silent.
 //!
-//! A rule that both versions have stands here, in `variables` or in `structure`; `fmi2` and `fmi3` have their own,
+//! A rule that both versions have is here, in `variables` or in `structure`; `fmi2` and `fmi3` have their own,
 //! and say what the shared ones ask of a variable.
 
 pub(crate) mod fmi2;

@@ -231,7 +231,7 @@ impl Check<'_> {
     }
 
     fn start<V: AnyVariable>(&mut self, v: usize, variable: &V) {
-        // An illegal combination is told already; further findings on it would be noise.
+        // An illegal combination is reported already; further findings on it would be noise.
         let Some(rule) = variable.legal(variable.causality(), variable.variability()) else { return };
         if variable.initial().is_some_and(|initial| !rule.allowed.contains(&initial)) {
             return;

@@ -12,7 +12,7 @@ const STYLE: &str = include_str!("page.css");
 pub struct Page<'a, C> {
     /// The title, as text.
     pub title: &'a str,
-    /// What stands in it, as HTML. A chart has a place: an element with its key as `data-chart`.
+    /// What is in it, as HTML. A chart has a place: an element with its key as `data-chart`.
     pub body: &'a str,
     /// The charts with their keys: a list of pairs.
     pub charts: C,

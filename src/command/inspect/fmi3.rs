@@ -295,7 +295,7 @@ fn capabilities(d: &ModelDescription, kind: &str, of: &fmi3::Interface) -> Strin
         (of.can_serialize_state, "serialise its state"),
         (of.provides_directional_derivatives, "give directional derivatives"),
         (of.provides_adjoint_derivatives, "give adjoint derivatives"),
-        (of.provides_per_element_dependencies, "tell dependencies of elements"),
+        (of.provides_per_element_dependencies, "report dependencies of elements"),
         (of.can_be_instantiated_only_once_per_process, "only be instantiated once per process"),
         (of.needs_execution_tool, "only run with its tool"),
     ])

@@ -45,7 +45,7 @@ fn of_each_element() {
     let message = slave.refused((API.get_number_of_variable_dependencies)(slave.instance, u, &mut 0));
     assert_eq!(
         message,
-        "fmi3GetNumberOfVariableDependencies: u is no output, so that its dependencies are not told"
+        "fmi3GetNumberOfVariableDependencies: u is not an output, so its dependencies are not reported"
     );
 
     let fmu = Fmu::of_fmi3(FILTER, true);

@@ -12,14 +12,14 @@
 //! the round goes on). At the start, u_ref within its bounds, the bounds that u_ref exceeds are active. Each
 //! join raises the dual objective, so no active set comes twice and the method ends; ties go to the row
 //! listed first. Round-off can break that argument, so rounds are counted. Beyond the limit the outcome is
-//! [`Outcome::Failed`]. After a row has left, δ is computed anew from the active rows.
+//! [`Outcome::Failed`]. After a row has left, δ is recomputed from the active rows.
 //!
 //! **Soft rows** have λ_j ≤ κ, the penalty per weighted length of their normal: the dual of the exact
 //! penalty κ max(0, −slack). A multiplier at κ is constant; its row moves from the active ones into the
 //! reference, and comes back when it holds with room to spare.
 //!
 //! **Infeasibility.** Where z = 0 and no λ_j falls, a_p = Σ r_j a_j with r_j ≤ 0: the active rows with
-//! r_j < 0 cap a_pᵀδ at its present value (Farkas). The rows are then taken anew one by one, in the order
+//! r_j < 0 cap a_pᵀδ at its present value (Farkas). The rows are then taken again one by one, in the order
 //! of priority, and the multiplier of each is raised with all rows before it kept. That is the same walk
 //! with one more event: a kept row that is reached becomes active. It ends where the row holds, or where
 //! the kept rows cap it. Then δ is already the least violation nearest to u_ref, and the rows of the

@@ -2,7 +2,7 @@
 //! their dependencies are positions of variables.
 //!
 //! The file is parsed once. `fmi-rs` reads the tree as an importer by someone else: a text that it refuses is no
-//! description, and its findings against the standard are told as problems. The model itself is read by
+//! description, and its findings against the standard are reported as problems. The model itself is read by
 //! `punctual_modeldescription`, from the same tree, because `fmi-rs` 0.3.4:
 //!
 //! - keeps the first of the declared types only;

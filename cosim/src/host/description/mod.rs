@@ -183,7 +183,7 @@ pub(crate) fn foreign_version(document: &Document<'_>) -> Option<String> {
     let is_version = head.parse::<u32>().is_ok() && tail.starts_with(|c: char| c.is_ascii_digit());
     (is_version && !["2", "3"].contains(&head)).then(|| {
         format!(
-            "it is of FMI {version}, and this program is for FMI 2.0 and 3.0; export it anew as one of these"
+            "it is of FMI {version}, and this program is for FMI 2.0 and 3.0; export it again as one of these"
         )
     })
 }

@@ -179,7 +179,7 @@ fn children<'a, 'i>(
         let rule = &rules[index];
         counts[index] += 1;
         if rule.group < reached {
-            let message = format!("{} stands too late in {name}; the order is {}", rule.name, allowed());
+            let message = format!("{} comes too late in {name}; the order is {}", rule.name, allowed());
             findings.add("schema.element", place(child), message);
         }
         reached = reached.max(rule.group);

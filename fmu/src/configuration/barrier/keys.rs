@@ -71,7 +71,9 @@ static KEYS: [Row; 33] = [
             meaning: "after the first step: to be inside from then on. Without one the barrier is to be kept from a start \
                       inside it; one outside is promised nothing, and `check` and `run` say so",
         },
-        parameters: &[whole("time from the first step to be inside and to stay so", |b| b.deadline.as_mut())],
+        parameters: &[whole("time from the first step by which h >= 0, and stays so", |b| {
+            b.deadline.as_mut()
+        })],
     },
     plain(
         "method",
@@ -90,16 +92,19 @@ static KEYS: [Row; 33] = [
             name: "rate",
             value: Number(Is("1/s"), Range::NON_NEGATIVE),
             default: Some("0"),
-            meaning: "decay of an error against the profile; 0 means 20/`deadline`, without a deadline what the bounds \
-                      can brake; at most 0.5/step",
+            meaning: "decay of an error against the profile; 0 means 20/`deadline`, without a deadline as fast as the \
+                      bounds can still stop; at most 0.5/step",
         },
         parameters: &[
             whole("decay rate of an error against the profile; 0: 20 / deadline, at most 0.5 / step", |b| {
                 b.deadline.map(|_| &mut b.rate.0)
             }),
-            whole("how fast h may go to the margin; 0: what the bounds can brake, at most 0.5 / step", |b| {
-                if b.deadline.is_none() { Some(&mut b.rate.0) } else { None }
-            }),
+            whole(
+                "how fast h may approach the margin; 0: as fast as the bounds can still stop, at most 0.5 / step",
+                |b| {
+                    if b.deadline.is_none() { Some(&mut b.rate.0) } else { None }
+                },
+            ),
         ],
     },
     plain(
@@ -124,16 +129,16 @@ static KEYS: [Row; 33] = [
             name: "margin",
             value: Number(OfH, Range::NON_NEGATIVE),
             default: Some("a hundredth of the radius, half axis or half side; else 0"),
-            meaning: "less than h ever is: h ≥ margin is what is aimed at, and plans keep half of it for a plant that is not quite the model; what held inputs are expected to cost is added",
+            meaning: "less than the largest h: the target is h ≥ margin, and plans keep half of it in reserve for a plant that differs slightly from the model; the expected loss from held inputs is added",
         },
-        parameters: &[whole("h to arrive and stay above", |b| Some(&mut b.margin))],
+        parameters: &[whole("h to reach and to stay above", |b| Some(&mut b.margin))],
     },
     Row {
         key: Key {
             name: "recovery",
             value: Number(S, Range::NON_NEGATIVE),
             default: Some("0"),
-            meaning: "a new deadline after leaving the set, from the first deadline on, which stands; 0: leaving is reported only",
+            meaning: "a new deadline after leaving the set, once the first deadline has passed, which is not changed; 0: leaving is only reported",
         },
         parameters: &[whole("deadline for coming back after leaving; 0: none", |b| Some(&mut b.recovery.0))],
     },
@@ -142,10 +147,10 @@ static KEYS: [Row; 33] = [
             name: "disturbance",
             value: Number(OfHighestDerivative, Range::NON_NEGATIVE),
             default: Some("0"),
-            meaning: "what the model does not know of h⁽ⁿ⁾; the promise holds for all within it",
+            meaning: "bound on the model's error in h⁽ⁿ⁾; the promise holds for every error within it",
         },
         parameters: &[whole(
-            "bound on what the model does not know of the derivative of h with an input",
+            "bound on the model's error in the derivative of h that the inputs enter",
             |b| b.disturbance.as_mut(),
         )],
     },
@@ -153,14 +158,14 @@ static KEYS: [Row; 33] = [
         "when_infeasible",
         Word(InfeasibleName::WORDS),
         Some("`report`"),
-        "`report`, or `soonest`: give up a deadline that the bounds certainly do not allow for a later one; with `assurance` one \
-         that no plan keeps, for the soonest that one does",
+        "`report`, or `earliest`: replaces a deadline that the bounds certainly do not allow by a later one; with `assurance`, one \
+         that no plan keeps by the earliest that a plan keeps",
     ),
     plain(
         "priority",
         Count(0, u32::MAX as u64),
         Some("0 where the start is inside, else 1"),
-        "where not all can be met, smaller numbers go first, of equal ones the one above",
+        "if not all can be met, smaller numbers come first, and among equal ones the barrier listed first",
     ),
     Row {
         key: Key {
@@ -184,7 +189,7 @@ static KEYS: [Row; 33] = [
             meaning: "after the first step, before `deadline`: enforced from then on. Without a deadline the state must \
                       be inside then",
         },
-        parameters: &[whole("time from the first step to be enforced from", |b| b.begin.as_mut())],
+        parameters: &[whole("time from the first step from which it is enforced", |b| b.begin.as_mut())],
     },
     plain(
         "after",
@@ -197,11 +202,11 @@ static KEYS: [Row; 33] = [
             name: "end",
             value: Number(S, Range::NON_NEGATIVE),
             default: Some("0"),
-            meaning: "after the first step, after `begin`, at or after `deadline`: let go then; 0: never",
+            meaning: "after the first step, after `begin`, at or after `deadline`: released then; 0: never",
         },
-        parameters: &[whole("time from the first step to be let go; 0: never", |b| b.end.as_mut())],
+        parameters: &[whole("time from the first step until it is released; 0: never", |b| b.end.as_mut())],
     },
-    plain("until_arrival", Flag, Some("`false`"), "let go once it has been reached"),
+    plain("until_arrival", Flag, Some("`false`"), "released once it has been reached"),
     Row {
         key: Key {
             name: "centre",
@@ -325,7 +330,7 @@ static KEYS: [Row; 33] = [
         "relative_degree",
         Count(1, MAX_RELATIVE_DEGREE as u64),
         Some(""),
-        "the order of the derivative of h that the inputs enter; nobody checks it",
+        "the order of the derivative of h that the inputs enter; it is not checked",
     ),
 ];
 

@@ -57,7 +57,7 @@ words! {
         #[default]
         Report = "report",
         /// [`Infeasible::Soonest`].
-        Soonest = "soonest",
+        Soonest = "earliest",
     }
 }
 
@@ -104,7 +104,7 @@ pub struct BarrierSection {
     #[serde(skip_serializing_if = "is_default")]
     pub when_infeasible: InfeasibleName,
     /// Rate a of the profile method in 1/s, ≥ 0, at most 0.5 / step. Default: 20 / deadline, without a deadline
-    /// the rate that the bounds can brake.
+    /// the rate at which the bounds can still stop.
     pub rate: Automatic,
     /// Rates in 1/s, > 0, as many as the relative degree, in place of `rate`; else empty.
     #[serde(skip_serializing_if = "Vec::is_empty")]

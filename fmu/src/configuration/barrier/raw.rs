@@ -1,4 +1,4 @@
-//! `[[barrier]]` as it stands in a file: the keys of all shapes.
+//! `[[barrier]]` as written in a file: the keys of all shapes.
 
 use serde::Deserialize;
 

@@ -79,7 +79,7 @@ impl Reader<'_> {
         } else if plant.plugin().is_some() && !["plugin", "external"].contains(&shape) {
             format!("is {shape:?}; the barriers of a plug-in are its own (\"plugin\")")
         } else if plant.plugin().is_none() && shape == "plugin" {
-            format!("is {shape:?}, but the plant is none")
+            format!("is {shape:?}, but the plant is not one")
         } else if plant.reference().is_none() && !own {
             format!("is {shape:?}, which is for the plants that have a name; give an `expression`")
         } else {
@@ -146,7 +146,7 @@ impl Reader<'_> {
         let Some(barrier) = known.iter().find(|b| b.name == *output) else {
             let names: Vec<_> = known.iter().map(|b| b.name.as_str()).collect();
             let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-            let message = "which is no barrier of the plug-in; its barriers are";
+            let message = "which is not a barrier of the plug-in; its barriers are";
             return self.refuse("output", format!("is {output:?}, {message} {names}"));
         };
         match &self.raw.unit {

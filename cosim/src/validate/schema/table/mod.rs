@@ -5,7 +5,7 @@ mod fmi3;
 
 use super::types::Value;
 
-/// Number of times that an element stands in its parent.
+/// Number of times that an element occurs in its parent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::validate::schema) enum Times {
     /// Exactly once.
@@ -26,7 +26,7 @@ impl Times {
     pub(in crate::validate::schema) fn most(self) -> usize {
         match self {
             Self::One | Self::Maybe => 1,
-            // A second element of a choice is told for the whole choice.
+            // A second element of a choice is reported for the whole choice.
             Self::Some | Self::Many | Self::Choice | Self::Mix => usize::MAX,
         }
     }
@@ -56,7 +56,7 @@ pub(in crate::validate::schema) struct Attribute {
     pub(in crate::validate::schema) required: Use,
 }
 
-/// A child of an element. Children of a lower group stand before those of a higher one.
+/// A child of an element. Children of a lower group come before those of a higher one.
 #[derive(Debug)]
 pub(in crate::validate::schema) struct Child {
     pub(in crate::validate::schema) name: &'static str,
