@@ -11,7 +11,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use punctual_core::dynamics::{ControlAffine, rk4_step};
-use punctual_core::filter::{Driver, FilterBuilder, Sampling, Standing};
+use punctual_core::filter::{AssuranceStatus, Driver, FilterBuilder, Sampling};
 use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 use support::{ByHand, Drive, T, X, obstructed};
 
@@ -46,7 +46,7 @@ where
 /// The times of the steps of a closed loop with plans behind them, in ns, sorted: those that give what the rows or u_ref
 /// wanted or near it, those that the plan decides, and the first. `None` where that finds no plan. The shortest of some
 /// runs of the same loop counts.
-fn witnessed<P>(plant: &P, builder: impl Fn() -> FilterBuilder, bounds: [f64; 2]) -> Option<[Vec<f64>; 3]>
+fn backed<P>(plant: &P, builder: impl Fn() -> FilterBuilder, bounds: [f64; 2]) -> Option<[Vec<f64>; 3]>
 where
     P: ControlAffine<4, 2>,
 {
@@ -64,7 +64,7 @@ where
             let assurance = filter.step(PERIOD * k as f64, &x, &[0.0; 2], &mut u);
             shortest[k] = f64::min(shortest[k], begin.elapsed().as_secs_f64() * 1e9);
             let assurance = assurance.expect("right dimensions").assurance.expect("plans");
-            if assurance.standing != Standing::Assured {
+            if assurance.status != AssuranceStatus::Assured {
                 return None;
             }
             by_plan[k] = assurance.driver == Driver::Plan;
@@ -94,7 +94,7 @@ where
             line(&format!("{name}, {obstacles} obstacles, {period} ms"), time);
         }
         let row = format!("{name}, {obstacles} obstacles, backup plan");
-        let Some(times) = witnessed(&plant, held, bounds) else {
+        let Some(times) = backed(&plant, held, bounds) else {
             println!("{row}\trefused");
             continue;
         };

@@ -1,7 +1,7 @@
 //! The slowest of many steps: `cargo bench --bench tail [-- STEPS]`, ten million by default.
 //!
-//! Every step has a state and a reference input of its own, drawn anew (seeded), so that branches and caches
-//! cannot learn it. The filter starts anew every thousand steps. The clock costs some 20 ns of each figure. The
+//! Every step has a state and a reference input of its own, drawn again (seeded), so that branches and caches
+//! cannot learn it. The filter restarts every thousand steps. The clock costs some 20 ns of each figure. The
 //! largest figure is that of the operating system as much as of the filter. So run it on a quiet machine, on a
 //! core of its own (`taskset`). The number of rounds of the solver, printed beside it, does not depend on the
 //! machine.

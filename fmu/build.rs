@@ -61,9 +61,9 @@ fn main() {
 fn link_unwinder() {
     const STATIC: &str = "libgcc_eh.a";
     let linker = env::var("RUSTC_LINKER").unwrap_or_else(|_| "cc".to_owned());
-    let told = Command::new(linker).arg(format!("-print-file-name={STATIC}")).output();
+    let reported = Command::new(linker).arg(format!("-print-file-name={STATIC}")).output();
     // Where there is none, it says the name alone.
-    let has_one = told.is_ok_and(|told| told.stdout.starts_with(b"/"));
+    let has_one = reported.is_ok_and(|reported| reported.stdout.starts_with(b"/"));
     let folder = env::var("OUT_DIR").unwrap_or_default();
     if has_one && fs::write(format!("{folder}/libgcc_s.so"), "GROUP ( -lgcc_eh -lgcc )\n").is_ok() {
         println!("cargo::rustc-cdylib-link-arg=-L{folder}");

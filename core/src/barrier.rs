@@ -27,9 +27,9 @@ use crate::scalar::Scalar;
 /// needs (see [`crate::barriers`]).
 pub trait Barrier<const NX: usize> {
     /// Whether h is concave in (t, x), or convex, as all [`barriers`](crate::barriers) of this crate are: then it
-    /// hides nothing narrow between two samples of a plant that [bends slowly](crate::dynamics::ControlAffine::BENDS_SLOWLY), and
+    /// hides nothing narrow between two samples of a plant that [bends slowly](crate::dynamics::ControlAffine::SLOW_CURVATURE), and
     /// with n > 1 a step does not look for it. With the default, `false`, it does.
-    const BENDS_ONE_WAY: bool = false;
+    const ONE_SIDED_CURVATURE: bool = false;
 
     /// h at time `t` (in seconds, on the filter's time axis) and state `x`.
     fn value<S: Scalar>(&self, t: S, x: &[S; NX]) -> S;

@@ -37,9 +37,9 @@ pub trait ControlAffine<const NX: usize, const NU: usize> {
     const LARGEST_DEGREE: usize = NX;
 
     /// Whether f and g vary slowly over a sampling period, wherever the state is, as those of vehicles do: then they hide
-    /// nothing narrow between two samples, and with n > 1 and a set that [bends one way](crate::barrier::Barrier::BENDS_ONE_WAY) a
+    /// nothing narrow between two samples, and with n > 1 and a set that [bends one way](crate::barrier::Barrier::ONE_SIDED_CURVATURE) a
     /// step does not look for it. With the default, `false`, it does, for a gust say.
-    const BENDS_SLOWLY: bool = false;
+    const SLOW_CURVATURE: bool = false;
 
     /// Whether `other` has the same f and g. Barriers along the same plant share what depends on it alone. The default knows
     /// only of plants without data that they are.
@@ -259,7 +259,7 @@ where
 {
     /// The point moves by itself, so no input reaches it: to the plant it is what time is.
     const LARGEST_DEGREE: usize = P::LARGEST_DEGREE;
-    const BENDS_SLOWLY: bool = P::BENDS_SLOWLY;
+    const SLOW_CURVATURE: bool = P::SLOW_CURVATURE;
 
     fn is_same(&self, other: &Self) -> bool {
         self.0.is_same(&other.0)

@@ -16,7 +16,7 @@ const BEFORE: usize = 3;
 
 /// How h runs from one instant to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Course {
+pub enum Interpolation {
     /// Along a straight line: relative degree 1, or instants that are close.
     Straight,
     /// Along the cubic through this instant and the three before.
@@ -25,7 +25,7 @@ pub enum Course {
 
 /// The state of a barrier's promise at an instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Standing {
+pub enum PromiseState {
     /// Not enforced yet.
     Waiting,
     /// Enforced.
@@ -122,12 +122,12 @@ impl Judgement {
 /// A judge of one barrier, by h at instants.
 ///
 /// ```
-/// use punctual_core::judge::{Course, Judge, Standing, Verdict};
+/// use punctual_core::judge::{Interpolation, Judge, PromiseState, Verdict};
 ///
 /// // It arrives at 10.2 s of 10 s: between two instants, of which the later one is inside.
-/// let mut judge = Judge::new(Some(10.0), Course::Straight);
+/// let mut judge = Judge::new(Some(10.0), Interpolation::Straight);
 /// for (t, h) in [(0.0, -60.0), (9.9, -0.57), (10.2, 0.0), (10.5, 0.0)] {
-///     judge.see(t, h, Standing::InForce, false);
+///     judge.see(t, h, PromiseState::InForce, false);
 /// }
 /// let seen = judge.judgement();
 /// assert_eq!((seen.verdict(), seen.late), (Verdict::Broken, Some(10.0)));
@@ -138,7 +138,7 @@ impl Judgement {
 pub struct Judge {
     /// T in s after the first instant.
     deadline: Option<f64>,
-    course: Course,
+    interpolation: Interpolation,
     /// The last instants, the newest first.
     before: [(f64, f64); BEFORE],
     count: usize,
@@ -156,10 +156,10 @@ pub struct Judge {
 
 impl Judge {
     /// A judge for a deadline in s after the first instant (`None` or infinite: none).
-    pub fn new(deadline: Option<f64>, course: Course) -> Self {
+    pub fn new(deadline: Option<f64>, interpolation: Interpolation) -> Self {
         Self {
             deadline: deadline.filter(|deadline| deadline.is_finite()),
-            course,
+            interpolation,
             before: [(0.0, 0.0); BEFORE],
             count: 0,
             size: 0.0,
@@ -173,7 +173,7 @@ impl Judge {
 
     /// Takes h at `t` (s), later than all before. `lost`: the filter is certain that the deadline is missed.
     /// Deadlines count from the first call with a finite h.
-    pub fn see(&mut self, t: f64, h: f64, standing: Standing, lost: bool) {
+    pub fn see(&mut self, t: f64, h: f64, promise_state: PromiseState, lost: bool) {
         if self.released || (self.count == 0 && !h.is_finite()) {
             return;
         }
@@ -186,11 +186,11 @@ impl Judge {
         if lost {
             self.certain.get_or_insert(t);
         }
-        self.begin(t, h, standing);
+        self.begin(t, h, promise_state);
         self.follow(t, h);
         self.judge_deadline(t, h);
-        self.count_in(t, h, standing);
-        self.released = standing == Standing::Released;
+        self.count_in(t, h, promise_state);
+        self.released = promise_state == PromiseState::Released;
         // Released after it arrived: there is nothing more to reach.
         self.seen.reached |= self.released && self.seen.arrival.is_some();
         self.before.rotate_right(1);
@@ -212,8 +212,8 @@ impl Judge {
         h >= -(TOLERANCE * self.size).max(LEAST_TOLERANCE)
     }
 
-    fn begin(&mut self, t: f64, h: f64, standing: Standing) {
-        if standing != Standing::Waiting && self.seen.began.is_none() {
+    fn begin(&mut self, t: f64, h: f64, promise_state: PromiseState) {
+        if promise_state != PromiseState::Waiting && self.seen.began.is_none() {
             self.seen.began = Some(t);
             self.seen.began_inside = self.is_inside(h);
         }
@@ -272,9 +272,9 @@ impl Judge {
     }
 
     /// Counts the instant itself, where it is to be inside then.
-    fn count_in(&mut self, t: f64, h: f64, standing: Standing) {
-        let always = self.seen.began_inside && standing != Standing::Waiting;
-        if standing == Standing::Released || !(always || self.due) {
+    fn count_in(&mut self, t: f64, h: f64, promise_state: PromiseState) {
+        let always = self.seen.began_inside && promise_state != PromiseState::Waiting;
+        if promise_state == PromiseState::Released || !(always || self.due) {
             return;
         }
         self.weigh(h);
@@ -311,9 +311,9 @@ impl Judge {
 
     /// h at `at`, between the instant before and `h` at `t`: Neville's scheme.
     fn between(&self, at: f64, t: f64, h: f64) -> f64 {
-        let before = match self.course {
-            Course::Straight => 1,
-            Course::Smooth => BEFORE,
+        let before = match self.interpolation {
+            Interpolation::Straight => 1,
+            Interpolation::Smooth => BEFORE,
         }
         .min(self.count);
         let mut points = [(t, h); BEFORE + 1];

@@ -45,8 +45,8 @@ pub use embedded::embedded;
 pub use external::external;
 pub(crate) use source::FEW_ORDERS;
 pub use source::{
-    COURSE, Course, CourseOver, DerivativeSource, Direction, Directional, Predict, PredictDirectional,
-    RateOver, SharedPlant,
+    DerivativeSource, Direction, Directional, EXPANSION_ORDERS, Expansion, ExpansionOver, Predict,
+    PredictDirectional, RateOver, SharedPlant,
 };
 
 /// The Taylor series of h(t, x(t)) at `t` and `x` with u = 0, `K` coefficients, each with its
@@ -254,7 +254,7 @@ where
         out.copy_from_slice(&self.plant.derivative(&x, &u));
     }
 
-    fn path(&self, x: &[f64], u: &[f64], out: &mut [Course]) {
+    fn path(&self, x: &[f64], u: &[f64], out: &mut [Expansion]) {
         let x = first::<f64, NX>(x);
         ahead::path::<P, NX, NU>(&self.plant, &x, u, out);
     }
@@ -263,30 +263,30 @@ where
         self.barrier.value(t, &first(x))
     }
 
-    fn value_along(&self, t: f64, path: &[Course], out: &mut Course) {
+    fn value_along(&self, t: f64, path: &[Expansion], out: &mut Expansion) {
         *out = ahead::value_along::<B, NX>(&self.barrier, t, path);
     }
 
-    fn rates_over(&self, path: &[CourseOver], u: &[f64], orders: usize, out: &mut [RateOver]) -> bool {
+    fn rates_over(&self, path: &[ExpansionOver], u: &[f64], orders: usize, out: &mut [RateOver]) -> bool {
         if orders <= FEW_ORDERS {
             ahead::rates_over::<P, NX, NU, FEW_ORDERS>(&self.plant, path, u, out);
         } else {
-            ahead::rates_over::<P, NX, NU, { COURSE - 1 }>(&self.plant, path, u, out);
+            ahead::rates_over::<P, NX, NU, { EXPANSION_ORDERS - 1 }>(&self.plant, path, u, out);
         }
         true
     }
 
-    fn value_over(&self, time: Interval, path: &[CourseOver]) -> Option<Interval> {
+    fn value_over(&self, time: Interval, path: &[ExpansionOver]) -> Option<Interval> {
         Some(ahead::value_over::<B, NX>(&self.barrier, time, path))
     }
 
-    fn last_over(&self, time: Interval, path: &[CourseOver]) -> Option<Interval> {
+    fn last_over(&self, time: Interval, path: &[ExpansionOver]) -> Option<Interval> {
         Some(ahead::last_over::<B, NX>(&self.barrier, time, path))
     }
 
     fn lowest_held(&self, t: f64, x: &[f64], u: &[f64], duration: f64, wanted: f64) -> Option<f64> {
         // With n > 1 the derivatives at the ends of a hold tell as much of such an h, for less.
-        if B::BENDS_ONE_WAY && P::BENDS_SLOWLY && K > 2 {
+        if B::ONE_SIDED_CURVATURE && P::SLOW_CURVATURE && K > 2 {
             return None;
         }
         let model = (&self.plant, &self.barrier);

@@ -56,7 +56,7 @@ impl Signals for PointMass {
 
 impl ControlAffine<4, 2> for PointMass {
     const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
-    const BENDS_SLOWLY: bool = true;
+    const SLOW_CURVATURE: bool = true;
 
     #[inline]
     fn drift<S: Scalar>(&self, x: &[S; 4]) -> [S; 4] {
@@ -89,7 +89,7 @@ impl Signals for MovedPoint {
 
 impl ControlAffine<2, 2> for MovedPoint {
     const LARGEST_DEGREE: usize = 1;
-    const BENDS_SLOWLY: bool = true;
+    const SLOW_CURVATURE: bool = true;
 
     #[inline]
     fn drift<S: Scalar>(&self, _x: &[S; 2]) -> [S; 2] {
@@ -119,7 +119,7 @@ impl Signals for Unicycle {
 
 impl ControlAffine<4, 2> for Unicycle {
     const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
-    const BENDS_SLOWLY: bool = true;
+    const SLOW_CURVATURE: bool = true;
 
     #[inline]
     fn drift<S: Scalar>(&self, x: &[S; 4]) -> [S; 4] {
@@ -166,7 +166,7 @@ impl Signals for Bicycle {
 
 impl ControlAffine<4, 2> for Bicycle {
     const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
-    const BENDS_SLOWLY: bool = true;
+    const SLOW_CURVATURE: bool = true;
 
     fn is_same(&self, other: &Self) -> bool {
         self == other
@@ -222,7 +222,7 @@ impl Signals for SmallSlipBicycle {
 
 impl ControlAffine<4, 2> for SmallSlipBicycle {
     const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
-    const BENDS_SLOWLY: bool = true;
+    const SLOW_CURVATURE: bool = true;
 
     fn is_same(&self, other: &Self) -> bool {
         self == other
@@ -263,7 +263,7 @@ impl Signals for SmallSlipBicycleWithRate {
 
 impl ControlAffine<5, 2> for SmallSlipBicycleWithRate {
     const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
-    const BENDS_SLOWLY: bool = true;
+    const SLOW_CURVATURE: bool = true;
 
     fn is_same(&self, other: &Self) -> bool {
         ControlAffine::<5, 2>::is_same(&self.0, &other.0)
@@ -337,7 +337,7 @@ impl Signals for KinematicBicycle {
 
 impl ControlAffine<5, 2> for KinematicBicycle {
     const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
-    const BENDS_SLOWLY: bool = true;
+    const SLOW_CURVATURE: bool = true;
 
     fn is_same(&self, other: &Self) -> bool {
         self == other

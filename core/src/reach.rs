@@ -3,7 +3,7 @@
 //!
 //! A source bounds h over every state that bounded inputs reach between two times ([`DerivativeSource::highest`]).
 //! Where that bound is negative at T, no input has h(T) ≥ 0. Where it is negative on each of the intervals that cover
-//! [0, τ], none has h ≥ 0 before τ (`docs/theory.md#lost-deadline`). [`soonest`] covers by steps that double after a
+//! [0, τ], none has h ≥ 0 before τ (`docs/theory.md#lost-deadline`). [`earliest_arrival`] covers by steps that double after a
 //! success and halve after a failure.
 //!
 //! For a chain of n integrators per axis with bounds per axis, the reachable positions are exactly a box
@@ -15,7 +15,7 @@ use crate::MAX_INPUTS;
 use crate::lie::DerivativeSource;
 use crate::qp::Bounds;
 
-/// [`soonest`] stops where steps of this part of the time reached fail.
+/// [`earliest_arrival`] stops where steps of this part of the time reached fail.
 pub const TOLERANCE: f64 = 1e-9;
 
 /// Round-off of a bound on h, as a part of the size of h that the caller gives.
@@ -52,11 +52,11 @@ pub(crate) fn ruled_out(
 /// let source = lie::along(PointMass, HalfPlane::new([1.0, 0.0], [9.0, 0.0])?, 2)?;
 /// let mut bounds = Bounds::NONE;
 /// (bounds.min[..2].fill(-2.0), bounds.max[..2].fill(2.0));
-/// let earliest = reach::soonest(&*source, (0.0, &[0.0; 4]), &bounds, 100.0).expect("known");
+/// let earliest = reach::earliest_arrival(&*source, (0.0, &[0.0; 4]), &bounds, 100.0).expect("known");
 /// assert!((earliest - 3.0).abs() < 1e-6);
 /// # Ok::<(), punctual_core::Error>(())
 /// ```
-pub fn soonest(
+pub fn earliest_arrival(
     source: &dyn DerivativeSource,
     (t, x): (f64, &[f64]),
     bounds: &Bounds,

@@ -5,8 +5,8 @@ mod scenario;
 
 use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::filter::{
-    BarrierSettings, Filter, FilterBuilder, FilterState, Phase, Report, SampleDerivative, Sampling, Standing,
-    Status,
+    AssuranceStatus, BarrierSettings, Filter, FilterBuilder, FilterState, Phase, Report, SampleDerivative,
+    Sampling, Status,
 };
 use punctual_core::lie::Direction;
 use punctual_core::plants::PointMass;
@@ -120,7 +120,7 @@ fn one_that_outlasts_the_run_never_asks_for_anything() {
     assert_eq!((filter.state().time, filter.state().start), (None, Some(3.0)));
 }
 
-/// Deadlines are started anew by a re-arming; the time until the filter is armed is not.
+/// Deadlines are restarted by a re-arming; the time until the filter is armed is not.
 #[test]
 fn rearming_does_not_make_it_wait_again() {
     let mut filter = filter(AFTER, Sampling::Period(0.1), 0.0);
@@ -239,15 +239,15 @@ fn plans_are_decided_on_when_it_is_armed() {
         let assurance =
             late.step(t, &moved, &hostile, &mut u).expect("right lengths").assurance.expect("plans");
         if k < 5 {
-            assert_eq!((assurance.standing, assurance.until), (Standing::Undecided, None), "at {t}");
+            assert_eq!((assurance.status, assurance.until), (AssuranceStatus::Undecided, None), "at {t}");
             assert_eq!((late.report().status, u), (Status::NotArmed, [-8.0, 6.0]));
             assert!(late.plan().is_none() && late.report().barriers.iter().all(|b| !b.guaranteed));
             // Nor is it decided on where u_ref is no number.
             let unwanted = late.peek(t, &moved, &[f64::NAN, 0.0], &mut [0.0; 2]);
             let unwanted = unwanted.expect("right lengths").assurance.expect("plans");
             assert_eq!(
-                (unwanted.standing, late.report().status),
-                (Standing::Undecided, Status::InvalidInput)
+                (unwanted.status, late.report().status),
+                (AssuranceStatus::Undecided, Status::InvalidInput)
             );
             // Taken back and made again, in an instance of its own too.
             let state = late.state().clone();
@@ -274,9 +274,9 @@ fn plans_are_decided_on_when_it_is_armed() {
         });
     }
     assert!(late.report().barriers[0].h >= 0.0, "6 s after the filter was armed it is there");
-    // A re-arming forgets the plan, and decides anew at once.
+    // A re-arming forgets the plan, and decides again at once.
     late.rearm();
-    assert_eq!(late.assurance().expect("plans").standing, Standing::Undecided);
+    assert_eq!(late.assurance().expect("plans").status, AssuranceStatus::Undecided);
     let mut u = [0.0; 2];
     assert!(late.step(8.0, &moved, &[0.0; 2], &mut u).expect("right lengths").is_assured());
 }

@@ -1,4 +1,4 @@
-//! Profiles of one's own: the check accepts right ones and names the defect of others. Distinct rates.
+//! Custom profiles: the check accepts right ones and names the defect of others. Distinct rates.
 
 use punctual_core::convergence::comparison::factorial;
 use punctual_core::convergence::operator::Operator;

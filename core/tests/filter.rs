@@ -70,7 +70,7 @@ fn late_stay_left_and_back() {
         (b.phase, b.on_course, b.arrival_time)
     };
     assert_eq!(phase(&mut filter, 3.0, &outside), (Phase::Approach, true, None));
-    // Where the profile asked it to be it is not, and no time is left to start anew.
+    // Where the profile asked it to be it is not, and no time is left to restart.
     assert_eq!(phase(&mut filter, 3.999, &outside), (Phase::Approach, false, None));
     assert_eq!(phase(&mut filter, 4.0, &outside), (Phase::Late, false, None));
     assert_eq!(phase(&mut filter, 4.5, &outside), (Phase::Late, false, None));

@@ -7,7 +7,7 @@ use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, Outside, StateBound};
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{
-    BarrierSettings, Begin, End, Filter, FilterBuilder, FilterState, Plans, Sampling, Standing,
+    AssuranceStatus, BarrierSettings, Begin, End, Filter, FilterBuilder, FilterState, Plans, Sampling,
 };
 use punctual_core::plan::Failure;
 use punctual_core::plants::{PointMass, Unicycle};
@@ -239,14 +239,14 @@ fn run<W: World>(world: &W, mut x: Vec<f64>, kind: u64, length: f64, random: &mu
         };
         let assurance =
             filter.step(t, &x, &u_ref, &mut u).expect("right dimensions").assurance.expect("plans");
-        match assurance.standing {
-            Standing::Refused => return Came::Refused(assurance.failure),
-            Standing::Expired => {
+        match assurance.status {
+            AssuranceStatus::Refused => return Came::Refused(assurance.failure),
+            AssuranceStatus::Expired => {
                 assert!(t >= until - 1e-9, "ended at {t}, before {until}");
                 assert_eq!(assurance.until, None);
                 return Came::Expired(until);
             }
-            Standing::Assured => {}
+            AssuranceStatus::Assured => {}
             _ => panic!("{t}: {assurance:?}"),
         }
         let now = assurance.until.expect("a time");
@@ -345,9 +345,9 @@ fn what_cannot_be_followed_for_ever_is_promised_until_a_time() {
             other.step(t, &x, &[0.0; 2], &mut again).expect("right dimensions");
             assert_eq!((again, other.assurance().expect("plans")), (u, &assurance), "{t}");
         }
-        match (assurance.standing, ended) {
-            (Standing::Assured, None) => until = assurance.until.expect("a time"),
-            (Standing::Expired, _) => {
+        match (assurance.status, ended) {
+            (AssuranceStatus::Assured, None) => until = assurance.until.expect("a time"),
+            (AssuranceStatus::Expired, _) => {
                 assert!(assurance.failure.is_some() && t >= until - 1e-9);
                 ended = Some(t);
             }
@@ -374,7 +374,7 @@ fn sets_that_move_for_ever_need_a_horizon() {
     let refused = |horizon| fleeing(horizon).err().map(|e| e.to_string()).unwrap_or_default();
     assert_eq!(
         refused(None),
-        "strip.source: moves with time, so that no plan ends; with a horizon one may end before"
+        "strip.source: moves with time, so that no plan ends; with a horizon one may end earlier"
     );
     assert_eq!(refused(Some(0.0)), "horizon: is 0, must be finite and > 0");
     assert_eq!(refused(Some(f64::NAN)), "horizon: is NaN, must be finite and > 0");

@@ -1,18 +1,18 @@
-//! The verdict on a promise, against known courses of h.
+//! The verdict on a promise, against known interpolations of h.
 
-use punctual_core::judge::{Course, Judge, Judgement, Standing, Verdict};
+use punctual_core::judge::{Interpolation, Judge, Judgement, PromiseState, Verdict};
 
 /// Judges `h(t)`, seen every `step` s until `end`.
 fn judged(
     deadline: Option<f64>,
-    course: Course,
+    interpolation: Interpolation,
     (step, end): (f64, f64),
     h: impl Fn(f64) -> f64,
 ) -> Judgement {
-    let mut judge = Judge::new(deadline, course);
+    let mut judge = Judge::new(deadline, interpolation);
     for k in 0..=(end / step).round() as usize {
         let t = k as f64 * step;
-        judge.see(t, h(t), Standing::InForce, false);
+        judge.see(t, h(t), PromiseState::InForce, false);
     }
     judge.judgement()
 }
@@ -31,7 +31,7 @@ fn the_deadline_lies_between_two_samples() {
             (deadline, Verdict::Kept),
         ] {
             let way = |t: f64| 6.0 * (t - zero);
-            let seen = judged(Some(deadline), Course::Straight, (step, deadline + 3.0 * step), way);
+            let seen = judged(Some(deadline), Interpolation::Straight, (step, deadline + 3.0 * step), way);
             assert_eq!(seen.verdict(), verdict, "T = {deadline}, step {step}, zero at {zero}: {seen:?}");
             assert!(near(seen.arrival, zero, 1e-9), "{seen:?}");
             assert!(near(seen.least, way(deadline), 1e-9), "{seen:?}");
@@ -43,11 +43,11 @@ fn the_deadline_lies_between_two_samples() {
 
 /// A parabola is its own cubic; a straight line through two of its points would be late.
 #[test]
-fn a_smooth_course_is_a_cubic() {
+fn a_smooth_interpolation_is_a_cubic() {
     for (curve, step) in [(-2.0, 0.3), (-0.5, 0.7), (1.5, 0.4)] {
         let zero = 5.0 - 0.01 * step;
         let way = |t: f64| 3.0 * (t - zero) + curve * (t - zero) * (t - zero) * 0.1;
-        let seen = judged(Some(5.0), Course::Smooth, (step, 6.0), way);
+        let seen = judged(Some(5.0), Interpolation::Smooth, (step, 6.0), way);
         assert!(seen.on_time(), "{seen:?}");
         assert!(near(seen.arrival, zero, 1e-9), "{seen:?}");
         assert!(near(seen.least, way(5.0), 1e-9), "{seen:?}");
@@ -59,12 +59,12 @@ fn a_smooth_course_is_a_cubic() {
 fn what_began_inside_is_to_stay() {
     for deadline in [None, Some(3.0), Some(8.0)] {
         let dip = |depth: f64| move |t: f64| if t > 1.75 && t < 2.25 { -depth } else { 4.0 };
-        let seen = judged(deadline, Course::Straight, (0.5, 10.0), dip(0.01));
+        let seen = judged(deadline, Interpolation::Straight, (0.5, 10.0), dip(0.01));
         assert_eq!((seen.verdict(), seen.began_inside), (Verdict::Broken, true), "{seen:?}");
         assert!(seen.left.is_some_and(|t| t > 1.5 && t <= 2.0), "{seen:?}");
         assert_eq!(seen.least, Some(-0.01));
         for round_off in [0.0, 5e-14, 3.9e-9] {
-            let seen = judged(deadline, Course::Straight, (0.5, 10.0), dip(round_off));
+            let seen = judged(deadline, Interpolation::Straight, (0.5, 10.0), dip(round_off));
             assert_eq!(seen.verdict(), Verdict::Kept, "{seen:?}");
         }
     }
@@ -72,7 +72,7 @@ fn what_began_inside_is_to_stay() {
 
 #[test]
 fn nothing_is_promised_from_outside_without_a_deadline() {
-    let seen = judged(None, Course::Straight, (0.1, 2.0), |t| t - 1.0);
+    let seen = judged(None, Interpolation::Straight, (0.1, 2.0), |t| t - 1.0);
     assert_eq!((seen.verdict(), seen.on_time(), seen.inside()), (Verdict::Nothing, false, false));
 }
 
@@ -80,37 +80,38 @@ fn nothing_is_promised_from_outside_without_a_deadline() {
 #[test]
 fn arriving_and_leaving() {
     let early = |t: f64| if (2.0..3.0).contains(&t) || t >= 4.9 { 1.0 } else { -1.0 };
-    assert_eq!(judged(Some(5.0), Course::Straight, (0.1, 8.0), early).verdict(), Verdict::Kept);
+    assert_eq!(judged(Some(5.0), Interpolation::Straight, (0.1, 8.0), early).verdict(), Verdict::Kept);
     let gone = |t: f64| if (2.0..4.0).contains(&t) { 1.0 } else { -1.0 };
-    let seen = judged(Some(5.0), Course::Straight, (0.1, 8.0), gone);
+    let seen = judged(Some(5.0), Interpolation::Straight, (0.1, 8.0), gone);
     assert_eq!((seen.verdict(), seen.late, seen.on_time()), (Verdict::Broken, None, true));
     assert!(near(seen.left, 3.95, 0.06), "{seen:?}");
     let later = |t: f64| if (4.0..6.0).contains(&t) { 1.0 } else { -1.0 };
-    let seen = judged(Some(5.0), Course::Straight, (0.1, 8.0), later);
+    let seen = judged(Some(5.0), Interpolation::Straight, (0.1, 8.0), later);
     assert!(seen.verdict() == Verdict::Broken && near(seen.left, 5.95, 0.06), "{seen:?}");
-    assert_eq!(judged(Some(5.0), Course::Straight, (0.1, 4.0), gone).verdict(), Verdict::Open);
-    let lost = judged(Some(5.0), Course::Straight, (0.1, 8.0), |t| if t > 6.95 { f64::NAN } else { 1.0 });
+    assert_eq!(judged(Some(5.0), Interpolation::Straight, (0.1, 4.0), gone).verdict(), Verdict::Open);
+    let lost =
+        judged(Some(5.0), Interpolation::Straight, (0.1, 8.0), |t| if t > 6.95 { f64::NAN } else { 1.0 });
     assert_eq!(lost.verdict(), Verdict::Broken, "a number that is none is not inside");
 }
 
 /// Released on arrival, and enforced from later on.
 #[test]
 fn windows() {
-    let mut judge = Judge::new(Some(5.0), Course::Straight);
-    for (t, h, standing) in [
-        (0.0, -3.0, Standing::InForce),
-        (1.0, 1.0, Standing::Released),
-        (2.0, -9.0, Standing::Released),
-        (6.0, -9.0, Standing::Released),
+    let mut judge = Judge::new(Some(5.0), Interpolation::Straight);
+    for (t, h, promise_state) in [
+        (0.0, -3.0, PromiseState::InForce),
+        (1.0, 1.0, PromiseState::Released),
+        (2.0, -9.0, PromiseState::Released),
+        (6.0, -9.0, PromiseState::Released),
     ] {
-        judge.see(t, h, standing, false);
+        judge.see(t, h, promise_state, false);
     }
     let seen = judge.judgement();
     assert!(near(seen.arrival, 0.75, 1e-9) && seen.verdict() == Verdict::Kept, "{seen:?}");
-    let mut judge = Judge::new(None, Course::Straight);
+    let mut judge = Judge::new(None, Interpolation::Straight);
     for (t, h) in [(0.0, -3.0), (1.0, -1.0), (2.0, 1.0), (3.0, 2.0)] {
-        let standing = if t < 2.0 { Standing::Waiting } else { Standing::InForce };
-        judge.see(t, h, standing, false);
+        let promise_state = if t < 2.0 { PromiseState::Waiting } else { PromiseState::InForce };
+        judge.see(t, h, promise_state, false);
     }
     let seen = judge.judgement();
     assert_eq!((seen.verdict(), seen.began, seen.least), (Verdict::Kept, Some(2.0), Some(1.0)), "{seen:?}");
@@ -122,11 +123,11 @@ fn certainty_and_h() {
     for (end, last, verdict) in
         [(3.0, -1.0, Verdict::Broken), (5.0, -1.0, Verdict::Broken), (5.0, 1.0, Verdict::Kept)]
     {
-        let mut judge = Judge::new(Some(4.0), Course::Straight);
+        let mut judge = Judge::new(Some(4.0), Interpolation::Straight);
         for k in 0..=5 {
             let t = f64::from(k);
             if t <= end {
-                judge.see(t, if t >= 4.0 { last } else { -1.0 }, Standing::InForce, k >= 2);
+                judge.see(t, if t >= 4.0 { last } else { -1.0 }, PromiseState::InForce, k >= 2);
             }
         }
         let seen = judge.judgement();

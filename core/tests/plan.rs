@@ -1,4 +1,4 @@
-//! A filter with a witness keeps what it has promised, whatever u_ref is; judged by an integrator of its own.
+//! A filter with a backup plan keeps what it has promised, whatever u_ref is; judged by an integrator of its own.
 
 #![expect(clippy::print_stdout, reason = "the figures of tests/nightly")]
 
@@ -11,8 +11,8 @@ use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, Outside, QuadraticDisc, StateBound};
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{
-    BarrierSettings, Begin, Driver, End, Filter, FilterBuilder, FilterState, Infeasible, Integration, Phase,
-    Plans, SampleDerivative, Sampling, Standing, Status,
+    AssuranceStatus, BarrierSettings, Begin, Driver, End, Filter, FilterBuilder, FilterState, Infeasible,
+    Integration, Phase, Plans, SampleDerivative, Sampling, Status,
 };
 use punctual_core::lie::{Direction, along};
 use punctual_core::plan::Failure;
@@ -151,7 +151,7 @@ fn what_is_promised_is_kept_whatever_is_wanted() {
             if k == 0 {
                 if !assurance.is_assured() {
                     assert!(
-                        assurance.standing == Standing::Refused && assurance.failure.is_some(),
+                        assurance.status == AssuranceStatus::Refused && assurance.failure.is_some(),
                         "{assurance:?}"
                     );
                     break;
@@ -186,17 +186,17 @@ fn what_no_input_can_keep_is_refused() {
     let mut u = [0.0; 2];
     let assurance =
         filter.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions").assurance.expect("plans");
-    assert!(assurance.standing == Standing::Refused && assurance.failure.is_some(), "{assurance:?}");
+    assert!(assurance.status == AssuranceStatus::Refused && assurance.failure.is_some(), "{assurance:?}");
     assert!(filter.plan().is_none());
     // The rows go on.
     assert!(u != [0.0; 2]);
 }
 
 /// The least time in which a point mass gets from rest to rest over a distance d is 2√(d/a); inside earlier.
-/// A deadline that cannot be kept is given up for the soonest that can, where the barrier allows it, and that one is kept.
+/// A deadline that cannot be kept is given up for the earliest that can, where the barrier allows it, and that one is kept.
 #[test]
-fn the_soonest_deadline_is_taken_and_kept() {
-    for infeasible in [Infeasible::Report, Infeasible::Soonest] {
+fn the_earliest_deadline_is_taken_and_kept() {
+    for infeasible in [Infeasible::Report, Infeasible::Earliest] {
         let goal = DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
         let settings = BarrierSettings { infeasible, ..BarrierSettings::within(2.0) };
         let filter = Filter::builder(4, 2)
@@ -212,7 +212,7 @@ fn the_soonest_deadline_is_taken_and_kept() {
             let assurance =
                 filter.step(t, &x, &[-8.0, 8.0], &mut u).expect("right dimensions").assurance.expect("plans");
             if infeasible == Infeasible::Report {
-                assert_eq!(assurance.standing, Standing::Refused);
+                assert_eq!(assurance.status, AssuranceStatus::Refused);
                 break;
             }
             let goal = &filter.report().barriers[0];
@@ -231,7 +231,7 @@ fn the_soonest_deadline_is_taken_and_kept() {
 }
 
 #[test]
-fn the_soonest_deadline_is_near_what_physics_allows() {
+fn the_earliest_deadline_is_near_what_physics_allows() {
     let goal = DistanceDisc::new([30.0, 0.0], 1.0, 1.0).expect("valid disc");
     for (deadline, bound) in [(2.0, 2.0), (20.0, 2.0), (5.0, 7.0)] {
         let filter = Filter::builder(4, 2)
@@ -241,7 +241,7 @@ fn the_soonest_deadline_is_near_what_physics_allows() {
             .and_then(FilterBuilder::build)
             .expect("valid filter");
         let filter = filter.with_plans(PERIOD).expect("a filter that can be assured");
-        let (factor, witness) = filter
+        let (factor, backup_plan) = filter
             .planning()
             .expect("plans")
             .earliest_deadline(0.0, &[0.0; 4], 100.0)
@@ -250,9 +250,9 @@ fn the_soonest_deadline_is_near_what_physics_allows() {
         let (d, room) = (29.0, 2.0);
         let speed = f64::sqrt(bound * (d + room));
         let least = speed / bound + (speed - f64::sqrt(2.0 * bound * room)) / bound;
-        let soonest = factor * deadline;
-        assert!((0.99 * least..1.08 * least).contains(&soonest), "a <= {bound}: {soonest} s, {least} s");
-        assert!(witness.effort <= 1.0);
+        let earliest = factor * deadline;
+        assert!((0.99 * least..1.08 * least).contains(&earliest), "a <= {bound}: {earliest} s, {least} s");
+        assert!(backup_plan.effort <= 1.0);
         // As promised, a little later can be assured, and much sooner cannot.
         assert!(filter.planning().expect("plans").plan_from(0.0, &[0.0; 4], 1.1 * factor).is_ok());
         assert!(
@@ -329,7 +329,7 @@ fn a_look_is_not_remembered() {
     }
 }
 
-/// Steps of any length that are told: each is kept until a promise is ended in so many words.
+/// Steps of any length that are given: each is kept until a promise is ended explicitly.
 #[test]
 fn steps_of_other_lengths_keep_the_promise_or_end_it() {
     let (mut kept, mut ended) = (0, 0);
@@ -355,7 +355,7 @@ fn steps_of_other_lengths_keep_the_promise_or_end_it() {
                 filter.step(t, &x, &u_ref, &mut u).expect("right dimensions").assurance.expect("plans");
             if !assurance.is_assured() {
                 assert!(
-                    seed % 3 != 0 && t > 0.0 && assurance.standing == Standing::Irregular,
+                    seed % 3 != 0 && t > 0.0 && assurance.status == AssuranceStatus::Irregular,
                     "{assurance:?}"
                 );
                 ended += 1;
@@ -431,11 +431,11 @@ struct Course<'a> {
     wind: [f64; 2],
 }
 
-/// What became of a run: the samples with and without the promise, and what it was withdrawn for first.
+/// What became of a run: the samples with and without the promise, and what it was lost for first.
 #[derive(Debug, Default)]
 struct Outcome {
     assured: usize,
-    lost: Vec<(f64, Standing, Option<Failure>)>,
+    lost: Vec<(f64, AssuranceStatus, Option<Failure>)>,
 }
 
 /// Runs to 10 s, or 2000 steps. At no instant is a set left that the sample before said was kept until the next.
@@ -457,7 +457,7 @@ fn judged(seed: u64, random: &mut Random, course: &mut Course<'_>) -> Outcome {
             filter.step(t, &x, &u_ref, &mut u).expect("right dimensions").assurance.expect("plans");
         match assurance.is_assured() {
             true => outcome.assured += 1,
-            false => outcome.lost.push((t, assurance.standing, assurance.failure)),
+            false => outcome.lost.push((t, assurance.status, assurance.failure)),
         }
         let flags: Vec<bool> = filter.report().barriers.iter().map(|b| b.guaranteed).collect();
         let parts = ((step / PERIOD * 20.0) as u32).max(1);
@@ -682,7 +682,7 @@ fn the_cost_of_a_step_does_not_grow_as_it_gets_shorter() {
 #[test]
 fn a_plan_of_another_period_ends_as_irregular() {
     let (mut seen, vehicle) = (0, Vehicle::Unicycle);
-    let soonest = vehicle
+    let earliest = vehicle
         .assured(6.0, [6.0, 2.0])
         .planning()
         .expect("plans")
@@ -696,7 +696,7 @@ fn a_plan_of_another_period_ends_as_irregular() {
         }
         let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
         // So tight that the plan drives.
-        let deadline = 6.0 * soonest * random.between(1.0, 1.15);
+        let deadline = 6.0 * earliest * random.between(1.0, 1.15);
         let mut filter = vehicle.assured(deadline, [6.0, 2.0]);
         let (mut t, mut x, mut u) = (0.0, [0.0, 0.0, -0.4, 1.0], [0.0; 2]);
         let other = random.between(0.3, 2.7) * PERIOD;
@@ -710,7 +710,7 @@ fn a_plan_of_another_period_ends_as_irregular() {
             }
             x = vehicle.move_by(x, u, hold);
             t += hold;
-            if step > change + 1 && format!("{:?}", filter.state().plan).contains("is_even: false") {
+            if step > change + 1 && format!("{:?}", filter.state().plan).contains("is_uniform: false") {
                 seen += 1;
                 let lost = |x: &[f64]| {
                     let mut copy = vehicle.assured(deadline, [6.0, 2.0]);
@@ -720,11 +720,11 @@ fn a_plan_of_another_period_ends_as_irregular() {
                         .expect("right dimensions")
                         .assurance
                         .expect("plans")
-                        .standing
+                        .status
                 };
-                assert_eq!(lost(&[-400.0, 0.0, 0.0, 0.0]), Standing::Irregular);
+                assert_eq!(lost(&[-400.0, 0.0, 0.0, 0.0]), AssuranceStatus::Irregular);
                 // Its input changes within this hold.
-                assert_eq!(lost(&[f64::NAN; 4]), Standing::Irregular);
+                assert_eq!(lost(&[f64::NAN; 4]), AssuranceStatus::Irregular);
             }
         }
     }
@@ -845,7 +845,7 @@ fn a_sample_at_another_time_ends_the_promise() {
         }
         let other =
             filter.step(late, &x, &[0.0; 2], &mut u).expect("right dimensions").assurance.expect("plans");
-        assert_eq!(other.standing, Standing::Irregular, "{t}");
+        assert_eq!(other.status, AssuranceStatus::Irregular, "{t}");
         // In time again: the same promise, from where the plant has come to.
         if wrong > 1.0 {
             x = Vehicle::PointMass.move_by(x, u, PERIOD);
@@ -874,28 +874,28 @@ fn what_was_missed_is_not_taken_up_again() {
             .expect("right dimensions")
             .assurance
             .expect("plans")
-            .standing
+            .status
     };
     let begun = || {
         let mut filter = Vehicle::PointMass.assured(8.0, [8.0; 2]);
-        assert_eq!(step(&mut filter, 0.0, [0.0; 4]), Standing::Assured);
+        assert_eq!(step(&mut filter, 0.0, [0.0; 4]), AssuranceStatus::Assured);
         filter
     };
     let inside = [GOAL.0[0], GOAL.0[1], 0.0, 0.0];
     // The obstacle is touched at the late sample.
     let mut filter = begun();
-    assert_eq!(step(&mut filter, 1.0, [OBSTACLE.0[0], OBSTACLE.0[1], 0.0, 0.0]), Standing::Withdrawn);
-    assert_eq!(step(&mut filter, 1.0 + PERIOD, inside), Standing::Withdrawn);
+    assert_eq!(step(&mut filter, 1.0, [OBSTACLE.0[0], OBSTACLE.0[1], 0.0, 0.0]), AssuranceStatus::Lost);
+    assert_eq!(step(&mut filter, 1.0 + PERIOD, inside), AssuranceStatus::Lost);
     // The deadline passes before the late sample, or after it: nobody saw.
     let mut filter = begun();
-    assert_eq!(step(&mut filter, 9.0, inside), Standing::Withdrawn);
+    assert_eq!(step(&mut filter, 9.0, inside), AssuranceStatus::Lost);
     let mut filter = begun();
-    assert_eq!(step(&mut filter, 7.99, inside), Standing::Irregular);
-    assert_eq!(step(&mut filter, 7.99 + PERIOD, inside), Standing::Withdrawn);
+    assert_eq!(step(&mut filter, 7.99, inside), AssuranceStatus::Irregular);
+    assert_eq!(step(&mut filter, 7.99 + PERIOD, inside), AssuranceStatus::Lost);
     // Nothing was missed.
     let mut filter = begun();
-    assert_eq!(step(&mut filter, 7.9, inside), Standing::Irregular);
-    assert_eq!(step(&mut filter, 7.9 + PERIOD, inside), Standing::Assured);
+    assert_eq!(step(&mut filter, 7.9, inside), AssuranceStatus::Irregular);
+    assert_eq!(step(&mut filter, 7.9 + PERIOD, inside), AssuranceStatus::Assured);
 }
 
 /// A promise that is lost, since the plant is not the model, is given again where a plan keeps it; what was broken is not.
@@ -920,9 +920,9 @@ fn a_lost_promise_is_taken_up_again() {
             let [flag, backed] =
                 [filter.report().barriers[0].guaranteed, filter.report().status == Status::Backup];
             assert_eq!(flag, assurance.is_assured(), "{run} {t}");
-            match assurance.standing {
-                Standing::Assured => assert!(k < 60 || !is_away && !hits, "{run} {t}"),
-                Standing::Withdrawn => {
+            match assurance.status {
+                AssuranceStatus::Assured => assert!(k < 60 || !is_away && !hits, "{run} {t}"),
+                AssuranceStatus::Lost => {
                     assert!(k >= 60 && assurance.failure.is_some() && !backed, "{run} {t}");
                     lost += 1;
                 }
@@ -964,7 +964,7 @@ fn gusts_lose_promises_but_do_not_make_them_lie() {
         };
         let mut filter = vehicle.assured(deadline, bounds);
         let (mut x, mut u) = ([random.between(-4.0, 4.0), random.between(-4.0, 4.0), 0.3, 0.0], [0.0; 2]);
-        let mut before = Standing::Undecided;
+        let mut before = AssuranceStatus::Undecided;
         for k in 0..600_u32 {
             let t = f64::from(k) * PERIOD;
             let blows = k > 0 && k < LAST && random.between(0.0, 1.0) < often;
@@ -973,21 +973,17 @@ fn gusts_lose_promises_but_do_not_make_them_lie() {
                 x[3] += size * random.between(-1.0, 1.0);
             }
             let wish = wanted(vehicle, u64::from(k) / 35 % 5, x, bounds, random);
-            let now = filter
-                .step(t, &x, &wish, &mut u)
-                .expect("right dimensions")
-                .assurance
-                .expect("plans")
-                .standing;
-            assert_eq!(filter.report().barriers[0].guaranteed, now == Standing::Assured, "{seed} {t}");
+            let now =
+                filter.step(t, &x, &wish, &mut u).expect("right dimensions").assurance.expect("plans").status;
+            assert_eq!(filter.report().barriers[0].guaranteed, now == AssuranceStatus::Assured, "{seed} {t}");
             match (before, now) {
-                (Standing::Undecided, Standing::Assured) => told[0] += 1,
-                (Standing::Undecided, Standing::Refused) => break,
-                (Standing::Assured, Standing::Withdrawn) => {
+                (AssuranceStatus::Undecided, AssuranceStatus::Assured) => told[0] += 1,
+                (AssuranceStatus::Undecided, AssuranceStatus::Refused) => break,
+                (AssuranceStatus::Assured, AssuranceStatus::Lost) => {
                     assert!(blows, "{seed} {t}: lost without a gust");
                     told[1] += 1;
                 }
-                (Standing::Withdrawn, Standing::Assured) => told[2] += 1,
+                (AssuranceStatus::Lost, AssuranceStatus::Assured) => told[2] += 1,
                 (a, b) => assert_eq!(a, b, "{seed} {t}"),
             }
             before = now;
@@ -996,13 +992,13 @@ fn gusts_lose_promises_but_do_not_make_them_lie() {
                 let after = t + PERIOD * f64::from(part) / f64::from(INSTANTS);
                 let distance = |c: [f64; 2]| (x[0] - c[0]).hypot(x[1] - c[1]);
                 // The rows know nothing of a promise that is not there.
-                if now == Standing::Assured {
+                if now == AssuranceStatus::Assured {
                     assert!(distance(OBSTACLE.0) >= OBSTACLE.1, "{seed} {after}: {x:?}");
                     assert!(after < deadline || distance(GOAL.0) <= GOAL.1, "{seed} {after}: {x:?}");
                 }
             }
         }
-        told[3] += u32::from(before == Standing::Assured);
+        told[3] += u32::from(before == AssuranceStatus::Assured);
     }
     println!(
         "accepted {}, lost {}, given again {}, assured at the end {}",
@@ -1121,7 +1117,7 @@ fn a_plant_that_is_not_the_model_ends_the_promise() {
         .expect("right dimensions")
         .assurance
         .expect("plans");
-    assert!(away.standing == Standing::Withdrawn && away.failure.is_some(), "{away:?}");
+    assert!(away.status == AssuranceStatus::Lost && away.failure.is_some(), "{away:?}");
 }
 
 #[test]
@@ -1155,7 +1151,7 @@ fn filters_that_plans_do_not_account_for_are_refused() {
     let moves = filter.with_plans(PERIOD).err().map(|error| error.to_string());
     assert_eq!(
         moves.as_deref(),
-        Some("goal.source: moves with time, so that no plan ends; with a horizon one may end before")
+        Some("goal.source: moves with time, so that no plan ends; with a horizon one may end earlier")
     );
 }
 
@@ -1199,7 +1195,7 @@ fn obstacles_that_move_are_kept_away_from() {
             };
             let assurance =
                 filter.step(t, &x, &u_ref, &mut u).expect("right dimensions").assurance.expect("plans");
-            if k == 0 && assurance.standing == Standing::Refused {
+            if k == 0 && assurance.status == AssuranceStatus::Refused {
                 println!("refused: {run} {:?}", assurance.failure);
                 break;
             }
@@ -1257,7 +1253,7 @@ fn what_begins_later_is_kept_from_then_on() {
             };
             let assurance =
                 filter.step(t, &x, &u_ref, &mut u).expect("right dimensions").assurance.expect("plans");
-            if k == 0 && assurance.standing == Standing::Refused {
+            if k == 0 && assurance.status == AssuranceStatus::Refused {
                 break;
             }
             accepted += i32::from(k == 0);
@@ -1290,7 +1286,8 @@ fn one_plan_is_of_one_plant() {
         .and_then(FilterBuilder::build)
         .expect("valid filter");
     let error = filter.with_plans(PERIOD).err().map(|e| e.to_string()).unwrap_or_default();
-    let message = "also.source: moves the state in another way than that of goal; a plan needs one plant for all barriers";
+    let message =
+        "also.source: moves the state differently from that of goal; a plan needs one plant for all barriers";
     assert_eq!(error, message);
 }
 
@@ -1313,10 +1310,10 @@ fn a_plan_does_not_jump_over_an_obstacle() {
         let filter = filter.with_plans(PERIOD).expect("a filter that can be assured");
         // Headed for its middle; where a plan is found, it goes around.
         let mut x = [0.0, 0.0, 20.0, 0.0];
-        let Ok(witness) = filter.planning().expect("plans").plan_from(0.0, &x, 1.0) else { continue };
+        let Ok(backup_plan) = filter.planning().expect("plans").plan_from(0.0, &x, 1.0) else { continue };
         found += 1;
         let (mut t, mut nearest) = (0.0, f64::INFINITY);
-        for (end, u) in &witness.inputs {
+        for (end, u) in &backup_plan.inputs {
             let steps = ((end - t) / 1e-3).round().max(1.0);
             for _ in 0..steps as usize {
                 x = Vehicle::PointMass.move_by(x, [u[0], u[1]], (end - t) / steps);
@@ -1381,7 +1378,7 @@ fn what_cannot_be_promised_is_not() {
     let mut keeping = filter(BarrierSettings::keeping());
     let assurance =
         keeping.step(0.0, &[0.0; 4], &[0.0; 2], &mut u).expect("right dimensions").assurance.expect("plans");
-    assert_eq!((assurance.standing, assurance.failure), (Standing::Refused, Some(Failure::Nothing)));
+    assert_eq!((assurance.status, assurance.failure), (AssuranceStatus::Refused, Some(Failure::Nothing)));
     assert!(keeping.planning().expect("plans").promised(0.0, &[0.0; 4]).eq([false]));
     assert!(keeping.planning().expect("plans").promised(0.0, &[GOAL.0[0], GOAL.0[1], 0.0, 0.0]).eq([true]));
     // A search that has no end is ended, with or without something to find.
@@ -1604,7 +1601,7 @@ fn a_policy_shows_the_way_through_a_gap() {
     }
 }
 
-/// The policy helps once. Armed again on the way, no search finds a plan, and the one at hand will do: also one that was
+/// The policy helps once. Armed again on the way, no search finds a plan, and the current one will do: also one that was
 /// followed meanwhile because the state was unknown, and one that was put back.
 #[test]
 fn armed_again_it_goes_on_with_the_plan_at_hand() {
@@ -1648,7 +1645,7 @@ fn armed_again_it_goes_on_with_the_plan_at_hand() {
                 let mut other = [0.0; 2];
                 blind.step(t, &seen, &wish, &mut other).expect("right dimensions");
                 assert_eq!((u, assurance.driver), (other, Driver::Plan), "at {t}");
-                assert_eq!((assurance.standing, assurance.until), (Standing::Undecided, None), "at {t}");
+                assert_eq!((assurance.status, assurance.until), (AssuranceStatus::Undecided, None), "at {t}");
                 assert!(filter.report().barriers.iter().all(|b| !b.guaranteed), "at {t}");
             } else {
                 assert!(assurance.is_assured(), "{unknown} unknown, at {t}: {assurance:?}");
@@ -1663,11 +1660,11 @@ fn armed_again_it_goes_on_with_the_plan_at_hand() {
     // From where the plan keeps nothing it is of no use, and once refused it is gone.
     let (mut filter, mut u) = (made(), [0.0; 2]);
     let steps = [
-        ([0.0; 4], Standing::Assured),
-        ([-200.0, 0.0, 0.0, 0.0], Standing::Refused),
-        ([0.0; 4], Standing::Refused),
+        ([0.0; 4], AssuranceStatus::Assured),
+        ([-200.0, 0.0, 0.0, 0.0], AssuranceStatus::Refused),
+        ([0.0; 4], AssuranceStatus::Refused),
     ];
-    for (k, (x, standing)) in (0..).zip(steps) {
+    for (k, (x, status)) in (0..).zip(steps) {
         helps.store(k == 0, Ordering::Relaxed);
         filter.rearm();
         let assurance = filter
@@ -1675,7 +1672,7 @@ fn armed_again_it_goes_on_with_the_plan_at_hand() {
             .expect("right dimensions")
             .assurance
             .expect("plans");
-        assert_eq!(assurance.standing, standing, "{k}");
+        assert_eq!(assurance.status, status, "{k}");
     }
 }
 
@@ -1697,15 +1694,15 @@ fn armed_again_between_samples_of_another_period_it_follows_the_plan() {
             filter.step(t, &seen, &[-3.0, 1.0], &mut u).expect("right dimensions").assurance.expect("plans");
         match is_unknown {
             true => assert_eq!(
-                (assurance.standing, assurance.driver),
-                (Standing::Undecided, Driver::Plan),
+                (assurance.status, assurance.driver),
+                (AssuranceStatus::Undecided, Driver::Plan),
                 "at {k}"
             ),
             false => assert!(assurance.is_assured(), "at {k}: {assurance:?}"),
         }
         x = Vehicle::PointMass.move_by(x, u, 0.8 * PERIOD);
     }
-    // At another time than was said, samples begin anew.
+    // At another time than was said, samples begin again.
     filter.rearm();
     assert_eq!(filter.usual_hold(100.0), Some(PERIOD));
 }
@@ -1890,7 +1887,7 @@ impl ControlAffine<1, 1> for Harvest {
 /// A search begins with a rest within the set too, and a plan may end under the law that leads there: the rest near the start is
 /// far away, falls by itself, or is lost within a hold, and no input to either side comes near.
 #[test]
-fn a_plan_leads_to_a_rest_within_the_set() {
+fn a_plan_leads_to_an_equilibrium_within_the_set() {
     for (seed, wish) in (1..=8_u64).zip((0..4).cycle()) {
         let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
         let mut about = |value: f64| random.between(0.95, 1.05) * value;
@@ -1935,7 +1932,7 @@ fn no_plan_lets_a_tank_run_dry() {
                 filter.step(t, &[x], &[0.0], &mut u).expect("dimensions").assurance.expect("plans");
             assert!(assurance.is_assured(), "{round}, at {t}, {x}: {assurance:?}");
             for _ in 0..200 {
-                // Not-a-number is empty.
+                // NaN is empty.
                 x = rk4_step(&Tank(rate), &[x], &u, period / 200.0)[0].max(0.0);
             }
             assert!(x <= limit, "{round}, at {t}: {x}");
@@ -2020,7 +2017,7 @@ fn leaves_the_edge<const N: usize>(random: &mut Random, draws: usize) -> u32 {
 /// The margin is due a period after a start at the edge, even where one input is held for longer: what is promised at the first
 /// sample stands at the next.
 #[test]
-fn what_leaves_the_edge_of_a_set_is_not_withdrawn() {
+fn what_leaves_the_edge_of_a_set_is_not_lost() {
     let random = &mut Random(47);
     let n = draws(20, 400);
     let assured = [leaves_the_edge::<1>, leaves_the_edge::<2>, leaves_the_edge::<3>]
@@ -2187,11 +2184,11 @@ fn a_thin_wall_is_seen_wherever_it_stands() {
             .expect("dimensions")
             .assurance
             .expect("plans");
-        assert_eq!(assurance.standing, Standing::Refused, "{way:?}");
+        assert_eq!(assurance.status, AssuranceStatus::Refused, "{way:?}");
     }
 }
 
-/// A plan that is given drives around each of them, and the promise is not withdrawn: the plant is the model.
+/// A plan that is given drives around each of them, and the guarantee is not lost: the plant is the model.
 #[test]
 fn small_things_on_a_long_way_are_seen() {
     let seeds = draws(16, 400);
@@ -2207,12 +2204,12 @@ fn small_things_on_a_long_way_are_seen() {
         for k in 0..900 {
             let (mut u, u_ref) = ([0.0; 2], if seed % 4 < 2 { [0.0; 2] } else { [-x[2], -x[3]] });
             let t = 0.05 * f64::from(k);
-            let standing =
-                filter.step(t, &x, &u_ref, &mut u).expect("dimensions").assurance.expect("plans").standing;
-            if k == 0 && standing == Standing::Refused {
+            let status =
+                filter.step(t, &x, &u_ref, &mut u).expect("dimensions").assurance.expect("plans").status;
+            if k == 0 && status == AssuranceStatus::Refused {
                 break;
             }
-            assert_eq!(standing, Standing::Assured, "seed {seed} at {t} s: {way:?}");
+            assert_eq!(status, AssuranceStatus::Assured, "seed {seed} at {t} s: {way:?}");
             assured += u32::from(k == 0);
             let after = |s: f64, i: usize| x[i] + x[i + 2] * s + u[i] * s * s / 2.0;
             for part in 1..=100 {
@@ -2269,12 +2266,12 @@ fn a_wind_on_a_short_stretch_is_seen_wherever_it_blows() {
         while PERIOD * f64::from(k) < deadline && !refused {
             let (t, u_ref) = (PERIOD * f64::from(k), [0.0, 0.3, -x[1]][seed as usize % 3]);
             let mut u = [0.0];
-            let standing =
-                filter.step(t, &x, &[u_ref], &mut u).expect("dimensions").assurance.expect("plans").standing;
-            refused = k == 0 && standing == Standing::Refused;
+            let status =
+                filter.step(t, &x, &[u_ref], &mut u).expect("dimensions").assurance.expect("plans").status;
+            refused = k == 0 && status == AssuranceStatus::Refused;
             assert!(
-                refused || standing == Standing::Assured,
-                "seed {seed} at {t} s: {standing:?}, {plant:?}"
+                refused || status == AssuranceStatus::Assured,
+                "seed {seed} at {t} s: {status:?}, {plant:?}"
             );
             // Some steps on the width of any wind.
             for _ in 0..200 {
@@ -2330,12 +2327,12 @@ fn jumps_and_powers_of_negative_numbers_are_seen() {
         }
         for k in 0..40 {
             let (t, u_ref, mut u) = (PERIOD * f64::from(k), [0.0, -1.0, -x[1]][round % 3], [0.0]);
-            let standing =
-                filter.step(t, &x, &[u_ref], &mut u).expect("dimensions").assurance.expect("plans").standing;
-            if k == 0 && standing == Standing::Refused {
+            let status =
+                filter.step(t, &x, &[u_ref], &mut u).expect("dimensions").assurance.expect("plans").status;
+            if k == 0 && status == AssuranceStatus::Refused {
                 break;
             }
-            assert_eq!(standing, Standing::Assured, "{odd:?} at {t} s: {x:?}");
+            assert_eq!(status, AssuranceStatus::Assured, "{odd:?} at {t} s: {x:?}");
             assured += u32::from(k == 0);
             for part in 1..=200 {
                 let s = PERIOD * f64::from(part) / 200.0;
@@ -2383,12 +2380,12 @@ fn small_things_are_seen_far_from_the_origin() {
         for k in 0..50 {
             let (t, mut u) = (PERIOD * f64::from(k), [0.0; 2]);
             let u_ref = [[0.0; 2], [1.0, 0.01]][round % 2];
-            let standing =
-                filter.step(t, &x, &u_ref, &mut u).expect("dimensions").assurance.expect("plans").standing;
-            if standing == Standing::Refused {
+            let status =
+                filter.step(t, &x, &u_ref, &mut u).expect("dimensions").assurance.expect("plans").status;
+            if status == AssuranceStatus::Refused {
                 break;
             }
-            assert_eq!(standing, Standing::Assured, "{far} at {t} s: {x:?}");
+            assert_eq!(status, AssuranceStatus::Assured, "{far} at {t} s: {x:?}");
             assured += 1;
             for _ in 0..400 {
                 x = rk4_step(&plant, &x, &u, PERIOD / 400.0);
@@ -2422,7 +2419,7 @@ fn a_deadline_beside_a_sample_is_looked_at() {
             .expect("dimensions")
             .assurance
             .expect("plans");
-        assert_eq!(assurance.standing, Standing::Refused, "{deadline}");
+        assert_eq!(assurance.status, AssuranceStatus::Refused, "{deadline}");
     }
 }
 
@@ -2478,7 +2475,7 @@ fn armed_again_when_all_is_over_it_follows_no_plan() {
             .expect("dimensions")
             .assurance
             .expect("plans");
-        assert_eq!((blind.standing, blind.driver), (Standing::Undecided, driver), "after {samples}");
+        assert_eq!((blind.status, blind.driver), (AssuranceStatus::Undecided, driver), "after {samples}");
     }
 }
 
@@ -2514,7 +2511,7 @@ where
 
 /// What goes on to creep, however slowly, is no rest: no promise is given that is lost later. Without a creep there are some.
 #[test]
-fn what_creeps_on_is_no_rest() {
+fn what_creeps_on_is_no_equilibrium() {
     let random = &mut Random(5);
     let mut assured = [0; 2];
     for round in 0..60 {
@@ -2530,13 +2527,13 @@ fn what_creeps_on_is_no_rest() {
         let mut filter = level_kept(plant, limit);
         for k in 0..1300 {
             let (t, u_ref, mut u) = (0.1 * f64::from(k), [0.0, 2.0, -x[0]][round % 3], [0.0]);
-            let standing =
-                filter.step(t, &x, &[u_ref], &mut u).expect("dimensions").assurance.expect("plans").standing;
-            if k == 0 && standing == Standing::Refused {
+            let status =
+                filter.step(t, &x, &[u_ref], &mut u).expect("dimensions").assurance.expect("plans").status;
+            if k == 0 && status == AssuranceStatus::Refused {
                 break;
             }
             assured[usize::from(creeps)] += u32::from(k == 0);
-            assert_eq!(standing, Standing::Assured, "{plant:?} at {t} s: {x:?}");
+            assert_eq!(status, AssuranceStatus::Assured, "{plant:?} at {t} s: {x:?}");
             x = rk4_step(&plant, &x, &u, 0.1);
         }
     }
@@ -2564,7 +2561,7 @@ impl ControlAffine<3, 1> for Hiding {
 
 /// What is left at a rest may be a slow decay above a creep, whichever way each leads: what is promised there is kept.
 #[test]
-fn a_rest_that_decays_slowly_stays_one() {
+fn an_equilibrium_that_is_left_slowly_stays_one() {
     let random = &mut Random(11);
     // Lost after 135 and 127 s where neither is told from the other, and where a rest may not wait until less of it is left.
     let (creep, decay, part) = (3.425_637_085_106_273e-8, 0.039_269_752_309_004_22, 0.004_518_107_559_785_99);
@@ -2584,15 +2581,15 @@ fn a_rest_that_decays_slowly_stays_one() {
         let mut filter = level_kept(plant, limit);
         for k in 0..4000 {
             let (t, u_ref, mut u) = (0.1 * f64::from(k), [0.0, 2.0, -x[0]][round % 3], [0.0]);
-            let standing =
-                filter.step(t, &x, &[u_ref], &mut u).expect("dimensions").assurance.expect("plans").standing;
-            if k == 0 && standing == Standing::Refused {
+            let status =
+                filter.step(t, &x, &[u_ref], &mut u).expect("dimensions").assurance.expect("plans").status;
+            if k == 0 && status == AssuranceStatus::Refused {
                 break;
             }
             assured += u32::from(k == 0);
             assert_eq!(
-                standing,
-                Standing::Assured,
+                status,
+                AssuranceStatus::Assured,
                 "{plant:?} from {speed} m/s to {limit} m at {t} s: {x:?}"
             );
             x = rk4_step(&plant, &x, &u, 0.1);
@@ -2669,7 +2666,7 @@ impl Barrier<4> for Near {
 /// A level that comes to rest at 0, where it does not stay, is no rest: however near it comes, it leaves within the day. One that
 /// is drawn there is.
 #[test]
-fn an_unstable_rest_is_none() {
+fn an_unstable_equilibrium_does_not_count() {
     let random = &mut Random(23);
     for round in 0..60 {
         let leads_out = round % 3 > 0;
@@ -2685,13 +2682,13 @@ fn an_unstable_rest_is_none() {
         // On the way that leads to 0, but for very little.
         let beside = if round % 2 == 0 { 0.0 } else { 10.0_f64.powf(random.between(-14.0, -7.0)) };
         let start = [0.0, 0.0, 0.5, -0.5 / (5.0 + rate) + beside];
-        let standing = filter
+        let status = filter
             .step(0.0, &start, &[0.0], &mut [0.0])
             .expect("dimensions")
             .assurance
             .expect("plans")
-            .standing;
-        assert_eq!(standing == Standing::Assured, !leads_out, "{plant:?} from {start:?}: {standing:?}");
+            .status;
+        assert_eq!(status == AssuranceStatus::Assured, !leads_out, "{plant:?} from {start:?}: {status:?}");
     }
 }
 
@@ -2742,13 +2739,13 @@ fn what_round_off_would_lose_is_not_followed() {
         let mut x = [brink * random.between(-0.7, 0.7), 0.0];
         let wanted = [0.0, -1e3, 1e3, 0.5 * most][round % 4];
         for k in 0..250 {
-            let standing = filter
+            let status = filter
                 .step(f64::from(k) * STEP, &x, &[wanted], &mut u)
                 .expect("dimensions")
                 .assurance
                 .expect("plans")
-                .standing;
-            assert_eq!(standing, Standing::Assured, "round {round}, step {k}, {x:?}");
+                .status;
+            assert_eq!(status, AssuranceStatus::Assured, "round {round}, step {k}, {x:?}");
             let from = x[0] + u[0] / stiffness;
             x = [from * cosh + x[1] / lambda * sinh - u[0] / stiffness, from * lambda * sinh + x[1] * cosh];
             assert!(x[0].abs() < brink, "round {round}, step {k}, {x:?}");
@@ -2792,9 +2789,13 @@ fn a_lag_far_shorter_than_a_hold_is_promised() {
         let wanted = [0.0, -1e3, 1e3, 0.7 * most][round % 4];
         for k in 0..100 {
             let t = f64::from(k) * step;
-            let standing =
-                filter.step(t, &x, &[wanted], &mut u).expect("dimensions").assurance.expect("plans").standing;
-            assert_eq!(standing, Standing::Assured, "round {round}, step {k}: lag {lag}, {step} s, {x:?}");
+            let status =
+                filter.step(t, &x, &[wanted], &mut u).expect("dimensions").assurance.expect("plans").status;
+            assert_eq!(
+                status,
+                AssuranceStatus::Assured,
+                "round {round}, step {k}: lag {lag}, {step} s, {x:?}"
+            );
             let after = |dt: f64| {
                 let gone = -(-dt / lag).exp_m1();
                 [x[0] + u[0] * dt + (x[1] - u[0]) * lag * gone, x[1] + (u[0] - x[1]) * gone]
@@ -2822,13 +2823,13 @@ fn a_place_far_from_the_origin_is_no_other_place() {
                 .and_then(FilterBuilder::build)
                 .expect("valid filter");
             let mut filter = filter.with_plans(PERIOD).expect("a filter that can be assured");
-            let standing = filter
+            let status = filter
                 .step(0.0, &[far, far, 1.0, 0.0], &[0.0; 2], &mut [0.0; 2])
                 .expect("dimensions")
                 .assurance
                 .expect("plans")
-                .standing;
-            assert_eq!(standing, Standing::Assured, "{vehicle:?} at {far}");
+                .status;
+            assert_eq!(status, AssuranceStatus::Assured, "{vehicle:?} at {far}");
         }
     }
 }
@@ -2836,7 +2837,7 @@ fn a_place_far_from_the_origin_is_no_other_place() {
 /// A state that creeps on where neither h nor the plant tells of it yet is no rest, if it leads out within the day. Where it
 /// ends inside it may be one.
 #[test]
-fn what_creeps_on_unseen_is_no_rest() {
+fn what_creeps_on_unseen_is_no_equilibrium() {
     let random = &mut Random(17);
     let mut told = [0; 2];
     for round in 0..draws(60, 600) {
@@ -2861,13 +2862,13 @@ fn what_creeps_on_unseen_is_no_rest() {
             .expect("valid filter");
         let mut filter = filter.with_plans(0.05).expect("a filter that can be assured");
         let start = [0.0, 0.0, -(10.0_f64.powf(random.between(0.0, 3.0)))];
-        let standing = filter
+        let status = filter
             .step(0.0, &start, &[0.0], &mut [0.0])
             .expect("dimensions")
             .assurance
             .expect("plans")
-            .standing;
-        let is_assured = standing == Standing::Assured;
+            .status;
+        let is_assured = status == AssuranceStatus::Assured;
         assert!(!(leads_out && is_assured), "{plant:?} from {start:?}, {cool:?}");
         // What is still fast beside the way before is no rest either.
         told[usize::from(leads_out)] += u32::from(leads_out || is_assured);

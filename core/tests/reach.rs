@@ -46,38 +46,38 @@ fn bounds(limit: f64) -> Bounds {
     bounds
 }
 
-fn soonest<P, B, const NX: usize>(plant: P, barrier: B, n: usize, x: [f64; NX], limit: f64) -> f64
+fn earliest<P, B, const NX: usize>(plant: P, barrier: B, n: usize, x: [f64; NX], limit: f64) -> f64
 where
     P: ControlAffine<NX, 2> + Send + 'static,
     B: Barrier<NX> + Send + 'static,
 {
     let source = lie::along(plant, barrier, n).expect("valid");
-    reach::soonest(&*source, (0.0, &x), &bounds(limit), 1e3).expect("known")
+    reach::earliest_arrival(&*source, (0.0, &x), &bounds(limit), 1e3).expect("known")
 }
 
 #[test]
-fn the_soonest_times_of_chains_are_the_known_ones() {
+fn the_earliest_times_of_chains_are_the_known_ones() {
     let close = |found: f64, wanted: f64| {
         // From below: it is a bound.
         assert!(found <= wanted * (1.0 + 1e-12) && found > wanted * (1.0 - 1e-6), "{found} for {wanted}");
     };
     let disc = DistanceDisc::new([10.0, 0.0], 2.0, 2.0).expect("valid");
-    close(soonest(Kinematic, disc, 1, [0.0; 2], 2.0), 4.0);
-    close(soonest(PointMass, disc, 2, [0.0; 4], 4.0), 2.0);
+    close(earliest(Kinematic, disc, 1, [0.0; 2], 2.0), 4.0);
+    close(earliest(PointMass, disc, 2, [0.0; 4], 4.0), 2.0);
     // Away at first: 8 = −4 τ + 2 τ².
-    close(soonest(PointMass, disc, 2, [0.0, 0.0, -4.0, 0.0], 4.0), 1.0 + 5.0_f64.sqrt());
+    close(earliest(PointMass, disc, 2, [0.0, 0.0, -4.0, 0.0], 4.0), 1.0 + 5.0_f64.sqrt());
     let half = HalfPlane::new([0.0, 1.0], [0.0, 9.0]).expect("valid");
-    close(soonest(PointMass, half, 2, [0.0; 4], 2.0), 3.0);
+    close(earliest(PointMass, half, 2, [0.0; 4], 2.0), 3.0);
     // The corner nearest is that of one axis.
     let rectangle = Rectangle::new([10.0, 0.0], [2.0, 50.0], 0.0).expect("valid");
-    close(soonest(PointMass, rectangle, 2, [0.0; 4], 4.0), 2.0);
-    assert_eq!(soonest(PointMass, disc, 2, [9.0, 0.0, 0.0, 0.0], 4.0), 0.0);
+    close(earliest(PointMass, rectangle, 2, [0.0; 4], 4.0), 2.0);
+    assert_eq!(earliest(PointMass, disc, 2, [9.0, 0.0, 0.0, 0.0], 4.0), 0.0);
     // Meeting a disc at 3 m/s: 10 − 2 = 2 τ²/… with the disc coming.
     let coming = disc.moving([-3.0, 0.0]).expect("valid");
-    close(soonest(PointMass, coming, 2, [0.0; 4], 4.0), (-3.0 + (9.0_f64 + 64.0).sqrt()) / 4.0);
+    close(earliest(PointMass, coming, 2, [0.0; 4], 4.0), (-3.0 + (9.0_f64 + 64.0).sqrt()) / 4.0);
     // Nothing known without bounds.
     let source = lie::along(PointMass, disc, 2).expect("valid");
-    assert_eq!(reach::soonest(&*source, (0.0, &[0.0; 4]), &Bounds::NONE, 1.0), None);
+    assert_eq!(reach::earliest_arrival(&*source, (0.0, &[0.0; 4]), &Bounds::NONE, 1.0), None);
 }
 
 /// Inputs drawn within the bounds, held for random times: none arrives before the bound.
@@ -96,7 +96,7 @@ where
         for i in 0..2 {
             (within.min[i], within.max[i]) = (-limits[i], limits[i]);
         }
-        let soonest = reach::soonest(&*source, (0.0, x0.as_slice()), &within, 20.0).expect("known");
+        let earliest = reach::earliest_arrival(&*source, (0.0, x0.as_slice()), &within, 20.0).expect("known");
         for _ in 0..20 {
             let (mut x, mut t) = (x0, 0.0);
             let mut u = [0.0; 2];
@@ -105,7 +105,7 @@ where
                     u = from_fn(|i| limits[i] * draw.uniform(-2.0, 2.0).clamp(-1.0, 1.0));
                 }
                 if disc.value(t, &x) >= 0.0 {
-                    assert!(t >= soonest, "{t} before {soonest} from {x0:?}");
+                    assert!(t >= earliest, "{t} before {earliest} from {x0:?}");
                     break;
                 }
                 x = rk4_step(&plant, &x, &u, 0.05);
@@ -116,7 +116,7 @@ where
 }
 
 #[test]
-fn no_bounded_run_arrives_before_the_soonest_time() {
+fn no_bounded_run_arrives_before_the_earliest_time() {
     never_earlier(PointMass, [2.0, 3.0], 1);
     never_earlier(Unicycle, [2.0, 3.0], 2);
     never_earlier(Bicycle::new(2.0).expect("valid"), [2.0, 0.8], 3);
@@ -164,7 +164,7 @@ fn late_is_certain_exactly_when_it_is() {
 fn a_deadline_out_of_reach_is_postponed_and_kept() {
     for profile in [ProfileKind::Hermite, ProfileKind::LowPeak] {
         let settings = BarrierSettings {
-            infeasible: Infeasible::Soonest,
+            infeasible: Infeasible::Earliest,
             profile,
             margin: 0.01,
             ..BarrierSettings::within(1.0)

@@ -13,7 +13,7 @@ use punctual_reference::simulation::{Schedule, closed_loop};
 use scenario::{Integrator, NonNegative, distance_disc, goal, speed_damping};
 
 /// A gust throws the vehicle out of the disc: with a recovery time it is back within that time, each
-/// time; the guarantee is given anew, and the count goes up.
+/// time; the guarantee is given again, and the count goes up.
 #[test]
 fn leaving_rearms_with_the_recovery_time() {
     let recovery = 1.5;
@@ -177,7 +177,7 @@ fn a_start_inside() {
     }
 }
 
-/// Another deadline on the way: the promise starts anew where the plant is, never without a guarantee,
+/// Another deadline on the way: the promise restarts where the plant is, never without a guarantee,
 /// and is kept.
 #[test]
 fn a_new_deadline_on_the_way() {

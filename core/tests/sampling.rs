@@ -362,7 +362,7 @@ fn the_margin_follows_the_measured_period() {
     };
     let (wanted, first) = (margin(&mut known, 0.0), margin(&mut measured, 0.0));
     assert!(settings().margin < first && first < wanted, "{first} {wanted}");
-    // Nearly: what has happened since the anchor may have started the profile anew.
+    // Nearly: what has happened since the anchor may have started the profile again.
     let second = margin(&mut measured, 0.02);
     assert!((second - wanted).abs() < 1e-3 * wanted, "{second} for {wanted}");
     // Again where one is longer still, and never less.
@@ -571,7 +571,7 @@ impl ControlAffine<2, 1> for Gust {
     }
 }
 
-/// A gust that is narrow beside a step and drives a plant of one's own into a wall of ours is seen.
+/// A gust that is narrow beside a step and drives a custom plant into a wall of ours is seen.
 #[test]
 fn what_is_on_course_is_not_blown_into_a_wall() {
     let [mut on_course, mut broken] = [0; 2];
@@ -613,7 +613,7 @@ struct Gusty {
 
 impl ControlAffine<3, 1> for Gusty {
     // Said to, so that nothing narrow is looked for in between.
-    const BENDS_SLOWLY: bool = true;
+    const SLOW_CURVATURE: bool = true;
 
     fn drift<S: Scalar>(&self, x: &[S; 3]) -> [S; 3] {
         let part = x[2] / self.hold;
@@ -629,7 +629,7 @@ impl ControlAffine<3, 1> for Gusty {
 struct Wall;
 
 impl Barrier<3> for Wall {
-    const BENDS_ONE_WAY: bool = true;
+    const ONE_SIDED_CURVATURE: bool = true;
 
     fn value<S: Scalar>(&self, _t: S, x: &[S; 3]) -> S {
         x[0]

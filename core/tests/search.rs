@@ -528,7 +528,7 @@ fn a_step_taken_again_gives_the_same_input() {
 /// The bend of a row that the sample before has learned shortens the search and changes no answer beyond its tolerance. A
 /// sample taken again begins from the same bend, so it has the same bits.
 #[test]
-fn a_kept_bend_only_shortens_the_search() {
+fn a_kept_curvature_only_shortens_the_search() {
     /// Both searches end within 1e-9 of the nearest input; two roundings of that size, with room.
     const SAME: f64 = 1e-8;
     fn run<P>(plant: P, seed: u64) -> [usize; 3]
@@ -553,8 +553,8 @@ fn a_kept_bend_only_shortens_the_search() {
             let u_ref = [[0.0; 2], [-0.5 * x[3], 0.0], wanted][kind];
             let (t, x_now) = (k as f64 * period, x);
             let mut state = filter.state().clone();
-            let begins = state.bends[1].is_some();
-            state.bends = [None; 2];
+            let begins = state.curvatures[1].is_some();
+            state.curvatures = [None; 2];
             without.restore(&state).expect("as many barriers");
             let step = |filter: &mut Filter| {
                 let mut u = [0.0; 2];
@@ -575,7 +575,7 @@ fn a_kept_bend_only_shortens_the_search() {
             // A promise may move on when asked twice, as into its next phase: then it asks for something else.
             let after = filter.state().clone();
             let again = step(filter).1;
-            if after.bends[1].is_some() && after.barriers == filter.state().barriers {
+            if after.curvatures[1].is_some() && after.barriers == filter.state().barriers {
                 assert_eq!(again.map(f64::to_bits), u.map(f64::to_bits), "{seed} at {t}, taken again");
                 repeated += 1;
             }
@@ -593,7 +593,7 @@ fn a_kept_bend_only_shortens_the_search() {
         };
         (samples, kept, repeated) = (samples + a, kept + b, repeated + c);
     }
-    println!("{samples} samples, {kept} from a kept bend, {repeated} taken again");
+    println!("{samples} samples, {kept} from a kept curvature, {repeated} taken again");
     assert!(kept > samples / 2 && repeated > samples / 2, "{kept} and {repeated} of {samples}");
 }
 

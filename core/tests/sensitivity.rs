@@ -375,7 +375,7 @@ fn a_later_deadline_is_held() {
         assert_eq!(unknown, None);
         (filter.report().barriers[0].time_left, filter.report().barriers[0].postponed, out)
     };
-    let (later, postponed, found) = differentiate(with(0.5, Infeasible::Soonest));
+    let (later, postponed, found) = differentiate(with(0.5, Infeasible::Earliest));
     assert!(postponed == 1 && later > 2.0, "{later}");
     let (_, postponed, wanted) = differentiate(with(later, Infeasible::Report));
     assert_eq!((postponed, found), (0, wanted));

@@ -8,7 +8,7 @@ use punctual_core::convergence::operator::Operator;
 use punctual_core::convergence::{FixedTimeState, Phase, Unmet};
 use punctual_core::dynamics::rk4_step;
 use punctual_core::filter::{
-    BarrierSettings, Begin, Bend, End, Filter, FilterBuilder, FilterState, Integration, Method, Report,
+    BarrierSettings, Begin, Curvature, End, Filter, FilterBuilder, FilterState, Integration, Method, Report,
     SampleDerivative, Sampling, Strictness,
 };
 use punctual_core::lie::Direction;
@@ -168,13 +168,13 @@ prop_compose! {
 }
 
 prop_compose! {
-    fn bend()(
+    fn curvature()(
         barrier in 0_u32..3,
         hessian in prop::array::uniform6(number()),
         looked in any::<u32>(),
-        aside in prop::option::of(any::<u32>()),
-    ) -> Bend {
-        Bend { barrier, hessian, looked, aside }
+        sideways in prop::option::of(any::<u32>()),
+    ) -> Curvature {
+        Curvature { barrier, hessian, looked, sideways }
     }
 }
 
@@ -186,9 +186,9 @@ proptest! {
         (time, period) in (prop::option::of(number()), prop::option::of(number())),
         start in prop::option::of(number()),
         input in prop::array::uniform32(number()),
-        bends in prop::array::uniform2(prop::option::of(bend())),
+        curvatures in prop::array::uniform2(prop::option::of(curvature())),
     ) {
-        let state = FilterState { barriers, time, period, input, start, bends, ..Default::default() };
+        let state = FilterState { barriers, time, period, input, start, curvatures, ..Default::default() };
         let text = json(&state);
         prop_assert_eq!(json(&back::<FilterState>(&text)), text);
         let mut filter = filter();

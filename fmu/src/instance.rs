@@ -152,7 +152,7 @@ enum Mistimed {
     /// For the first time, `given` in place of `restored`, in s.
     First { given: f64, restored: f64 },
     /// As was reported.
-    Told,
+    Reported,
 }
 
 /// The reason why a call failed, for the log: the value given and those allowed.
@@ -510,13 +510,13 @@ impl Instance {
     pub fn notice(&mut self) -> Option<String> {
         match self.mistimed {
             Mistimed::First { given, restored } => Some(self.tell_mistimed(given, restored)),
-            Mistimed::Never | Mistimed::Told => self.block.notice(),
+            Mistimed::Never | Mistimed::Reported => self.block.notice(),
         }
     }
 
     #[cold]
     fn tell_mistimed(&mut self, given: f64, restored: f64) -> String {
-        self.mistimed = Mistimed::Told;
+        self.mistimed = Mistimed::Reported;
         format!(
             "currentCommunicationPoint is {given}, must be the restored one, {restored}: the step is made from there, \
              as every such step after a restore (reported once)"

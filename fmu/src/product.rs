@@ -11,7 +11,7 @@ pub(crate) use arrays::Access;
 pub use arrays::{Item, TIME};
 pub use outputs::{BARRIER_OUTPUTS, BarrierOutput, Reading};
 
-use punctual_core::filter::{Phase, Standing, Status};
+use punctual_core::filter::{AssuranceStatus, Phase, Status};
 use punctual_modeldescription::{
     Causality, CoSimulation, DefaultExperiment, EnumerationItem, Integer, LogCategory, ModelDescription,
     NamingConvention, Plain, Real, SimpleType, Unit, Variability, Variable, VariableKind,
@@ -238,7 +238,9 @@ fn phase_type() -> SimpleType {
 const ASSURANCE: &str = "Assurance";
 
 fn assurance_type() -> SimpleType {
-    let items = Standing::ALL.map(|standing| (standing.name(), standing as i32, standing.meaning()));
+    let items = AssuranceStatus::ALL.map(|assurance_status| {
+        (assurance_status.name(), assurance_status as i32, assurance_status.meaning())
+    });
     enumeration(ASSURANCE, "Status of the guarantee of a filter that follows plans", &items)
 }
 
@@ -425,8 +427,8 @@ fn plant_variables(c: &PlantConfiguration) -> (Table, Layout) {
         table.signal("u", input, "", Causality::Input);
     }
     let outputs = table.variables.len();
-    let told = c.output_signals();
-    let parameters = outputs + states.len() + told.len();
+    let reported = c.output_signals();
+    let parameters = outputs + states.len() + reported.len();
     for (i, state) in states.iter().enumerate() {
         let variable = table.signal("x", state, "", Causality::Output);
         variable.dependencies = Some(Vec::new());
@@ -434,7 +436,7 @@ fn plant_variables(c: &PlantConfiguration) -> (Table, Layout) {
         variable.initial_dependencies = Some(vec![(parameters + i) as u32]);
     }
     let rows = c.parameters();
-    for output in &told {
+    for output in &reported {
         let variable = table.signal("y", output, "", Causality::Output);
         variable.dependencies = Some(Vec::new());
         if c.experiment.fmi == FmiVersion::Three {

@@ -14,7 +14,7 @@
 //! keep theirs. Only a plan has no fixed length, and it comes last. Damaged bytes, and those of another FMU, are refused by the name of the field.
 
 use punctual_core::convergence::{FixedTimeState, Phase, Unmet};
-use punctual_core::filter::{Bend, Commitment, FilterState};
+use punctual_core::filter::{Curvature, FilterState, PlanState};
 use punctual_modeldescription::BaseType;
 
 use crate::block::{BlockState, Values};
@@ -55,7 +55,7 @@ fn follows_plans(product: &Product) -> bool {
 fn plan(state: &State) -> Result<Vec<u8>, Failure> {
     match &state.block {
         BlockState::Filter { memory, .. } => postcard::to_stdvec(&memory.plan),
-        _ => postcard::to_stdvec(&Commitment::default()),
+        _ => postcard::to_stdvec(&PlanState::default()),
     }
     .map_err(|e| e.to_string())
 }
@@ -76,7 +76,7 @@ fn fixed_size(product: &Product) -> usize {
                 + c.barrier.len() * FixedTimeState::SIZE
                 + 3 * <Option<f64>>::SIZE
                 + Inputs::SIZE
-                + Bends::SIZE
+                + Curvatures::SIZE
                 + f64::SIZE
         }
         Configuration::Plant(_) => product.layout.states * f64::SIZE,
@@ -126,14 +126,15 @@ pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), F
     // The memory of the block.
     match block {
         BlockState::Filter { rearm_seen, memory } => {
-            let FilterState { barriers, time, period, input, start, bends, integrated, plan: _ } = &**memory;
+            let FilterState { barriers, time, period, input, start, curvatures, integrated, plan: _ } =
+                &**memory;
             rearm_seen.write(&mut out);
             barriers.iter().for_each(|barrier| barrier.write(&mut out));
             time.write(&mut out);
             period.write(&mut out);
             input.write(&mut out);
             start.write(&mut out);
-            bends.write(&mut out);
+            curvatures.write(&mut out);
             integrated.write(&mut out);
             if let Some(plan) = plan {
                 (plan.len() as u64).write(&mut out);
@@ -220,9 +221,9 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
                 period: input.field("period")?,
                 input: input.field("input")?,
                 start: input.field("start")?,
-                bends: input.field("bends")?,
+                curvatures: input.field("curvatures")?,
                 integrated: input.finite("integrated")?,
-                plan: if has_plan { read_plan(&mut input)? } else { Commitment::default() },
+                plan: if has_plan { read_plan(&mut input)? } else { PlanState::default() },
             };
             BlockState::Filter { rearm_seen, memory: Box::new(memory) }
         }
@@ -243,7 +244,7 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
 }
 
 /// The plan state that comes last. Whether it is one of this filter is found when it is restored.
-fn read_plan(input: &mut Reader) -> Result<Commitment, Failure> {
+fn read_plan(input: &mut Reader) -> Result<PlanState, Failure> {
     let length: u64 = input.field("length of the plan")?;
     if length != input.rest.len() as u64 {
         return Err(format!("the length of the plan is {length} bytes, must be {}", input.rest.len()));
@@ -423,8 +424,8 @@ impl<T: Field + Copy + Default, const N: usize> Field for [T; N] {
 /// The type of `FilterState::input`.
 type Inputs = [f64; punctual_core::MAX_INPUTS];
 
-/// The type of `FilterState::bends`.
-type Bends = [Option<Bend>; 2];
+/// The type of `FilterState::curvatures`.
+type Curvatures = [Option<Curvature>; 2];
 
 /// Writes and reads structures field by field: one that is missing here, or of another type, does not compile.
 macro_rules! structure {
@@ -444,7 +445,7 @@ macro_rules! structure {
     };
 }
 
-structure!(Bend { barrier: u32, hessian: [f64; 6], looked: u32, aside: Option<u32> });
+structure!(Curvature { barrier: u32, hessian: [f64; 6], looked: u32, sideways: Option<u32> });
 
 structure!(Unmet { steps: u32, since: f64, h: f64 });
 

@@ -9,8 +9,8 @@ use punctual_core::internal::{self, Coefficients, SUBSTEPS};
 use punctual_core::interval::Interval;
 use punctual_core::jet::{Dual, Tangent};
 use punctual_core::lie::{
-    Ahead, COURSE, Course, CourseOver, DerivativeSource, Derivatives, Direction, Directional, Predict,
-    PredictDirectional, RateOver, RelativeDegree, SharedPlant,
+    Ahead, DerivativeSource, Derivatives, Direction, Directional, EXPANSION_ORDERS, Expansion, ExpansionOver,
+    Predict, PredictDirectional, RateOver, RelativeDegree, SharedPlant,
 };
 use punctual_core::scalar::Scalar;
 
@@ -105,10 +105,10 @@ pub(crate) fn source<E: Equations>(
             flow: Flow::new(plant),
             along_tangent: Along::new(plant, along, n),
             flow_tangent: Flow::new(plant),
-            courses: Along::new(plant, along, COURSE - 1),
+            expansions: Along::new(plant, along, EXPANSION_ORDERS - 1),
             value: Along::new(plant, along, 1),
             few_over: Along::new(plant, along, 1),
-            courses_over: Along::new(plant, along, COURSE - 1),
+            expansions_over: Along::new(plant, along, EXPANSION_ORDERS - 1),
             held: vec![[Interval::ALL; 2]; plant.states()],
             rate: vec![0.0; plant.states()],
         };
@@ -361,11 +361,11 @@ struct Work<E, const M: usize> {
     flow: Flow<E, f64>,
     along_tangent: Along<E, Tangent<Dual<M>>>,
     flow_tangent: Flow<E, Tangent<f64>>,
-    courses: Along<E, f64>,
+    expansions: Along<E, f64>,
     value: Along<E, f64>,
     /// Enclosures of h, and of it and its rate.
     few_over: Along<E, Interval>,
-    courses_over: Along<E, Interval>,
+    expansions_over: Along<E, Interval>,
     /// The states and their rates while an input is held, and the rates at its begin.
     held: Vec<[Interval; 2]>,
     rate: Vec<f64>,
@@ -487,38 +487,38 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
     }
 
     fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]) {
-        rates_at(&mut self.work.borrow_mut().courses.flow, x, u, out);
+        rates_at(&mut self.work.borrow_mut().expansions.flow, x, u, out);
     }
 
-    fn path(&self, x: &[f64], u: &[f64], out: &mut [Course]) {
-        let courses = &mut self.work.borrow_mut().courses;
-        courses.flow.set_state(x.iter().copied());
-        courses.flow.hold(u.iter().copied());
-        courses.continue_from_flow(0.0);
+    fn path(&self, x: &[f64], u: &[f64], out: &mut [Expansion]) {
+        let expansions = &mut self.work.borrow_mut().expansions;
+        expansions.flow.set_state(x.iter().copied());
+        expansions.flow.hold(u.iter().copied());
+        expansions.continue_from_flow(0.0);
         for (i, out) in out.iter_mut().enumerate() {
-            *out = std::array::from_fn(|k| courses.series.get(i, k));
+            *out = std::array::from_fn(|k| expansions.series.get(i, k));
         }
     }
 
     fn value(&self, t: f64, x: &[f64]) -> f64 {
-        let courses = &mut self.work.borrow_mut().value;
-        courses.follow(t, |i, _| x[i])
+        let expansions = &mut self.work.borrow_mut().value;
+        expansions.follow(t, |i, _| x[i])
     }
 
-    fn value_along(&self, t: f64, path: &[Course], out: &mut Course) {
-        let courses = &mut self.work.borrow_mut().courses;
-        courses.follow(t, |i, k| path[i][k]);
-        *out = std::array::from_fn(|k| courses.series.get(courses.h, k));
+    fn value_along(&self, t: f64, path: &[Expansion], out: &mut Expansion) {
+        let expansions = &mut self.work.borrow_mut().expansions;
+        expansions.follow(t, |i, k| path[i][k]);
+        *out = std::array::from_fn(|k| expansions.series.get(expansions.h, k));
     }
 
-    fn rates_over(&self, path: &[CourseOver], u: &[f64], orders: usize, out: &mut [RateOver]) -> bool {
-        let Along { equations, series, .. } = &mut self.work.borrow_mut().courses_over;
+    fn rates_over(&self, path: &[ExpansionOver], u: &[f64], orders: usize, out: &mut [RateOver]) -> bool {
+        let Along { equations, series, .. } = &mut self.work.borrow_mut().expansions_over;
         for (register, &value) in (path.len()..).zip(u) {
             series.set(register, 0, Interval::from(value));
         }
         for k in 0..orders {
-            for (i, course) in path.iter().enumerate() {
-                series.set(i, k, course[k]);
+            for (i, expansion) in path.iter().enumerate() {
+                series.set(i, k, expansion[k]);
             }
             equations.advance(series, k);
             for (i, out) in out.iter_mut().enumerate() {
@@ -528,7 +528,7 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
         equations.encloses()[0]
     }
 
-    fn value_over(&self, time: Interval, path: &[CourseOver]) -> Option<Interval> {
+    fn value_over(&self, time: Interval, path: &[ExpansionOver]) -> Option<Interval> {
         let few_over = &mut self.work.borrow_mut().few_over;
         let h = few_over.follow(time, |i, _| path[i][0]);
         few_over.equations.encloses()[1].then_some(h)
@@ -575,10 +575,10 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
         Some(internal::sharper(low, value.follow(t, |i, _| x[i]), slope, duration))
     }
 
-    fn last_over(&self, time: Interval, path: &[CourseOver]) -> Option<Interval> {
-        let courses = &mut self.work.borrow_mut().courses_over;
-        courses.follow(time, |i, k| path[i][k]);
-        courses.equations.encloses()[1].then(|| courses.series.get(courses.h, COURSE - 1))
+    fn last_over(&self, time: Interval, path: &[ExpansionOver]) -> Option<Interval> {
+        let expansions = &mut self.work.borrow_mut().expansions_over;
+        expansions.follow(time, |i, k| path[i][k]);
+        expansions.equations.encloses()[1].then(|| expansions.series.get(expansions.h, EXPANSION_ORDERS - 1))
     }
 }
 

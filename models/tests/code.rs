@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use punctual_core::interval::Interval;
-use punctual_core::lie::{Ahead, COURSE, CourseOver, DerivativeSource, Derivatives, Direction};
+use punctual_core::lie::{Ahead, DerivativeSource, Derivatives, Direction, EXPANSION_ORDERS, ExpansionOver};
 use punctual_models::Model;
 use punctual_models::evaluated::{Calculator, Code, CodeModel, Dimensions, LITERAL, Number, OPERATIONS};
 
@@ -124,16 +124,17 @@ fn what_looks_at_plain_values_encloses_nothing() {
         let model = made(plant, barrier).and_then(|m| m.barrier(0).map_err(|e| e.to_string()));
         model.expect("a barrier").source(n).expect("in range")
     };
-    let path = |half: f64| -> Vec<CourseOver> {
+    let path = |half: f64| -> Vec<ExpansionOver> {
         let over = |x: &f64| {
-            let mut course = [Interval::from(0.0); COURSE];
-            course[0] = Interval::new(x - half, x + half);
-            course
+            let mut expansion = [Interval::from(0.0); EXPANSION_ORDERS];
+            expansion[0] = Interval::new(x - half, x + half);
+            expansion
         };
         STATES[0].iter().map(over).collect()
     };
     let encloses = |source: &dyn DerivativeSource, half: f64| {
-        let (model, mut rates) = (source.predict().expect("a model"), [[Interval::ALL; COURSE - 1]; 4]);
+        let (model, mut rates) =
+            (source.predict().expect("a model"), [[Interval::ALL; EXPANSION_ORDERS - 1]; 4]);
         let h = model.value_over(Interval::from(0.0), &path(half));
         [model.rates_over(&path(half), &[1.0, 0.5], 1, &mut rates), h.is_some()]
     };

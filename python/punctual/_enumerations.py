@@ -37,7 +37,7 @@ class Assurance(IntEnum):
     """A plan keeps every promise, whatever u_ref is."""
     REFUSED = 2
     """No plan was found at the start: nothing is promised."""
-    WITHDRAWN = 3
+    LOST = 3
     """Was assured: the plant is not where the model led."""
     IRREGULAR = 4
     """Was assured: a step came late, or early without a plan from there."""

@@ -186,7 +186,7 @@ impl FilterBatch {
             own.rearm();
             memory.clone_from(own.memory());
         }
-        self.withdraw(&chosen);
+        self.revoke(&chosen);
         Ok(())
     }
 
@@ -198,7 +198,7 @@ impl FilterBatch {
         for (memory, _) in self.memories.iter_mut().zip(&chosen).filter(|(_, chosen)| **chosen) {
             memory.clone_from(&self.fresh);
         }
-        self.withdraw(&chosen);
+        self.revoke(&chosen);
         Ok(())
     }
 }
@@ -223,7 +223,7 @@ impl FilterBatch {
     }
 
     /// What the chosen rows had promised is over.
-    fn withdraw(&mut self, chosen: &[bool]) {
+    fn revoke(&mut self, chosen: &[bool]) {
         let barriers = self.interface.barriers.len();
         for (i, _) in chosen.iter().enumerate().filter(|(_, chosen)| **chosen) {
             self.guaranteed[i * barriers..][..barriers].fill(false);

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use punctual_core::filter::{Assurance, FilterState, Standing};
+use punctual_core::filter::{Assurance, AssuranceStatus, FilterState};
 use punctual_fmu::configuration::FilterConfiguration;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -140,9 +140,9 @@ impl Filter {
     #[getter]
     fn refusal(&mut self) -> Option<String> {
         let own = self.own.get_mut().unwrap_or_else(PoisonError::into_inner);
-        let Assurance { standing, failure, .. } = *own.filter().assurance()?;
-        failure.map(|failure| match standing {
-            Standing::Refused => self.configuration.refusal(failure),
+        let Assurance { status, failure, .. } = *own.filter().assurance()?;
+        failure.map(|failure| match status {
+            AssuranceStatus::Refused => self.configuration.refusal(failure),
             _ => self.configuration.failure(failure),
         })
     }

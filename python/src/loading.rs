@@ -33,9 +33,9 @@ pub(crate) fn configuration(argument: &Bound<'_, PyAny>) -> PyResult<FilterConfi
         helper.call_method1("text_folder_file", (argument,))?.extract()?;
     parse(&text, folder, &file).or_else(|error| {
         let reason = error.value(argument.py()).str()?;
-        let told =
+        let reported =
             argument.py().import("punctual._trace")?.call_method1("with_function", (reason, argument))?;
-        Err(refused(&told))
+        Err(refused(&reported))
     })
 }
 

@@ -2,7 +2,7 @@
 
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use punctual_core::filter::Filter;
-use punctual_core::plan::Witness;
+use punctual_core::plan::BackupPlan;
 use punctual_fmu::configuration::FilterConfiguration;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -54,13 +54,13 @@ impl Plan {
         (t, x): (f64, &[f64]),
         configuration: &FilterConfiguration,
     ) -> PyResult<Option<Self>> {
-        let (Some(witness), Some(planning)) = (filter.plan(), filter.planning()) else { return Ok(None) };
-        let Witness { inputs: holds, tightest, effort, until, .. } = witness;
+        let (Some(backup_plan), Some(planning)) = (filter.plan(), filter.planning()) else { return Ok(None) };
+        let BackupPlan { inputs: holds, tightest, effort, until, .. } = backup_plan;
         // An integrated input is a state of the way, and its rate the input.
         let states = Signals::of(configuration.plant.states());
         let inputs = Signals::of(configuration.plant.inputs());
         let end = holds.last().map_or(t, |(end, _)| *end);
-        let way = planning.trajectory(witness, t, x, ((end - t) / POINTS).max(f64::MIN_POSITIVE));
+        let way = planning.trajectory(backup_plan, t, x, ((end - t) / POINTS).max(f64::MIN_POSITIVE));
         let reports = filter.report().barriers.iter().enumerate().filter(|(_, report)| report.guaranteed);
         let to_come = |left: f64| Some(filter.report().time + left).filter(|at| left > 0.0 && at.is_finite());
         let kept: Vec<_> = reports.map(|(i, report)| (i, to_come(report.time_left))).collect();

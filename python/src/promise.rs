@@ -1,7 +1,7 @@
 //! The verdict on a promise, from a recorded run.
 
 use punctual_core::filter::{Phase, Status};
-use punctual_core::judge::{Course, Judge, Standing, Verdict};
+use punctual_core::judge::{Interpolation, Judge, PromiseState, Verdict};
 use punctual_fmu::configuration::over_seconds;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -21,18 +21,19 @@ pub(crate) fn judge<'py>(
     }
     let (of_h, of_slack) = units;
     let straight = over_seconds(&of_h, 1) == of_slack;
-    let mut judge = Judge::new(deadline, if straight { Course::Straight } else { Course::Smooth });
+    let mut judge =
+        Judge::new(deadline, if straight { Interpolation::Straight } else { Interpolation::Smooth });
     let mut started = false;
     for (t, h, phase, lost, status) in rows {
         started |= !Status::from_number(status).is_some_and(Status::is_abstention);
         let is = |wanted: Phase| phase == wanted as i32;
-        let standing = match () {
-            () if is(Phase::Released) => Standing::Released,
-            () if is(Phase::Waiting) => Standing::Waiting,
-            () => Standing::InForce,
+        let promise_state = match () {
+            () if is(Phase::Released) => PromiseState::Released,
+            () if is(Phase::Waiting) => PromiseState::Waiting,
+            () => PromiseState::InForce,
         };
         if started {
-            judge.see(t, h, standing, lost || is(Phase::Late));
+            judge.see(t, h, promise_state, lost || is(Phase::Late));
         }
     }
     let seen = judge.judgement();

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use numpy::PyArray1;
-use punctual_core::filter::{self, Filter, Phase, Reason, Standing, Status};
+use punctual_core::filter::{self, AssuranceStatus, Filter, Phase, Reason, Status};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyType};
@@ -109,7 +109,7 @@ pub(crate) struct Step {
     #[pyo3(get)]
     u: Py<PyArray1<f64>>,
     status: Status,
-    standing: Option<Standing>,
+    assurance_status: Option<AssuranceStatus>,
     /// Time in s until which every promise is kept, `inf` for ever; `None` where nothing is assured.
     #[pyo3(get)]
     assured_until: Option<f64>,
@@ -124,7 +124,7 @@ impl Step {
         Self {
             u: PyArray1::from_slice(py, u).unbind(),
             status: report.status,
-            standing: assurance.map(|assurance| assurance.standing),
+            assurance_status: assurance.map(|assurance| assurance.status),
             assured_until: assurance.and_then(|assurance| assurance.until),
             reason: assurance.and_then(|assurance| assurance.reason),
             barriers: report.barriers.clone(),
@@ -144,7 +144,9 @@ impl Step {
     /// Status of the guarantee; `None` where no plans are followed.
     #[getter]
     fn assurance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        self.standing.map(|standing| member(py, &ASSURANCE, "Assurance", standing as i32)).transpose()
+        self.assurance_status
+            .map(|assurance_status| member(py, &ASSURANCE, "Assurance", assurance_status as i32))
+            .transpose()
     }
 
     /// Why u_ref was changed: the name of a barrier, and when in s it would be broken, or come nearest to its edge, had u_ref been

@@ -9,7 +9,7 @@ use punctual_core::MAX_INPUTS;
 use punctual_core::dynamics::DynPlant;
 use punctual_core::error::{Error, non_negative, positive};
 use punctual_core::filter::{BarrierSettings, Filter, Phase, ProfileKind, Report, Status};
-use punctual_core::judge::{Course, Judge, Judgement, Standing, Verdict};
+use punctual_core::judge::{Interpolation, Judge, Judgement, PromiseState, Verdict};
 
 /// A closed loop to run.
 #[derive(Clone, Copy)]
@@ -76,9 +76,9 @@ impl Running<'_> {
         run.unmet += usize::from(is_armed && !report.status.is_satisfied());
         for ((b, judge), seen) in report.barriers.iter().zip(&mut self.judges).zip(&mut run.barriers) {
             if is_armed {
-                judge.see(t, b.h, standing(b.phase), b.deadline_unreachable);
+                judge.see(t, b.h, promise_state(b.phase), b.deadline_unreachable);
             }
-            let enforced = standing(b.phase) == Standing::InForce;
+            let enforced = promise_state(b.phase) == PromiseState::InForce;
             if b.unmet_steps > 0 || enforced && report.status.is_abstention() {
                 seen.unmet += 1;
                 seen.first_unmet.get_or_insert(t);
@@ -97,7 +97,7 @@ impl Running<'_> {
             filter.barrier_values(t, x, &mut self.h)?;
             let barriers = &filter.report().barriers;
             for ((h, b), judge) in self.h.iter().zip(barriers).zip(&mut self.judges) {
-                judge.see(t, *h, standing(b.phase), b.deadline_unreachable);
+                judge.see(t, *h, promise_state(b.phase), b.deadline_unreachable);
             }
         }
         self.bound(x);
@@ -149,11 +149,11 @@ impl Running<'_> {
     }
 }
 
-fn standing(phase: Phase) -> Standing {
+fn promise_state(phase: Phase) -> PromiseState {
     match phase {
-        Phase::Waiting => Standing::Waiting,
-        Phase::Released => Standing::Released,
-        _ => Standing::InForce,
+        Phase::Waiting => PromiseState::Waiting,
+        Phase::Released => PromiseState::Released,
+        _ => PromiseState::InForce,
     }
 }
 
@@ -174,7 +174,7 @@ pub fn run(
     let mut x = x0.to_vec();
     let (mut u_ref, mut u, mut last) = (vec![0.0; inputs], vec![0.0; inputs], vec![0.0; inputs]);
     let count = setting.deadlines.len();
-    let judge = |deadline: &f64| Judge::new(Some(*deadline), Course::Straight);
+    let judge = |deadline: &f64| Judge::new(Some(*deadline), Interpolation::Straight);
     let run = Run {
         kept: false,
         arrival: None,

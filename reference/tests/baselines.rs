@@ -206,7 +206,7 @@ impl Condition for Complete {
     }
 }
 
-/// A condition with rates is enforced over the period; one that hands over is followed by the stay constraint, with its
+/// A condition with rates is enforced over the period; one that switches over is followed by the stay constraint, with its
 /// guarantee.
 #[test]
 fn a_condition_that_is_a_method() {

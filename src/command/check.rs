@@ -14,9 +14,9 @@ use punctual_fmu::configuration::{
 };
 use serde::Serialize;
 
+use super::backup_plan::{self, BackupPlanReport};
 use super::closed_loop::{self, LoopReport, RatingReport, ReachReport, Verdict, Wanted};
 use super::map::{self, MapReport, Plane};
-use super::witness::{self, WitnessReport};
 use crate::output::{self, number};
 
 /// Round-off of h at a start on the boundary, in its unit.
@@ -84,7 +84,7 @@ struct FilterReport {
     with_damping: Option<LoopReport>,
     /// The plan that keeps every promise whatever u_ref is, where every input has bounds.
     #[serde(skip_serializing_if = "Option::is_none")]
-    backup_plan: Option<WitnessReport>,
+    backup_plan: Option<BackupPlanReport>,
     /// The starts that can be promised, where they were asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     map: Option<MapReport>,
@@ -373,7 +373,7 @@ fn filter(
         simulated.filter(|_| failed && matches!(wanted, Wanted::None) && closed_loop::has_damping(c));
     let with_damping = damped.map(|x0| closed_loop::watch(c, x0, &Wanted::Damping)).transpose()?;
     let backup_plan =
-        simulated.map(|x0| witness::find(c, x0, closed_loop.as_ref(), out)).transpose()?.flatten();
+        simulated.map(|x0| backup_plan::find(c, x0, closed_loop.as_ref(), out)).transpose()?.flatten();
     let (step, experiment) = (c.experiment.step_size, c.experiment);
     let mut warnings = Configuration::Filter(c.clone()).in_degrees();
     let runs_for = experiment.stop_time - experiment.start_time;
@@ -394,7 +394,7 @@ fn filter(
         warnings.extend(in_vain(c));
     }
     let degrees: Vec<usize> = filter.relative_degrees().collect();
-    let (uneven, inputs) = (c.uneven(), c.plant.inputs());
+    let (mixed_degree, inputs) = (c.mixed_degree(), c.plant.inputs());
     let mut barriers = Vec::new();
     // Each barrier: its settings, as given or chosen.
     for (i, section) in c.barrier.iter().enumerate() {
@@ -440,14 +440,14 @@ fn filter(
         if deadline.is_finite() && arm_after < runs_for && runs_for - arm_after < deadline {
             warn("the experiment stops before the deadline".to_owned());
         }
-        let uneven = uneven.iter().find(|(barrier, _)| *barrier == i).map(|(_, found)| found);
-        of_the_method(c, &rows, i, uneven.is_some()).into_iter().for_each(&mut warn);
+        let mixed_degree = mixed_degree.iter().find(|(barrier, _)| *barrier == i).map(|(_, found)| found);
+        of_the_method(c, &rows, i, mixed_degree.is_some()).into_iter().for_each(&mut warn);
         // Findings from the start.
         let report = begun.then(|| filter.report().barriers[i]);
         let reach = match (simulated, settings.deadline) {
             (Some(x0), Some(deadline)) if c.is_bounded() => {
                 let plans = backup_plan.as_ref().filter(|_| c.is_assured());
-                let plans = plans.map(|w| (w.keeps(name), w.soonest(name)));
+                let plans = plans.map(|w| (w.keeps(name), w.earliest_deadline(name)));
                 let run = closed_loop.as_ref().filter(|run| !run.by_rows && c.run.simulated.is_none());
                 let arrival = run.and_then(|run| run.arrival(i, experiment.start_time));
                 Some(closed_loop::reach(c, (i, deadline), (x0, wanted), plans, arrival)?)
@@ -455,8 +455,8 @@ fn filter(
             _ => None,
         };
         let simulated = closed_loop.as_ref().map(|run| run.barriers[i].promise);
-        let planned = backup_plan.as_ref().filter(|witness| c.is_assured() && witness.covers(name));
-        let guaranteed = planned.is_some_and(|witness| witness.keeps(name));
+        let planned = backup_plan.as_ref().filter(|backup_plan| c.is_assured() && backup_plan.covers(name));
+        let guaranteed = planned.is_some_and(|backup_plan| backup_plan.keeps(name));
         let start = report.map(|b| StartReport {
             h: b.h,
             inside: b.h >= -ROUND_OFF,
@@ -465,7 +465,7 @@ fn filter(
                 None => b.on_course && simulated.is_none_or(|seen| seen == Kept::Kept),
             },
             guaranteed,
-            guaranteed_until: backup_plan.as_ref().filter(|_| guaranteed).and_then(WitnessReport::until),
+            guaranteed_until: backup_plan.as_ref().filter(|_| guaranteed).and_then(BackupPlanReport::until),
             on_course: b.on_course,
             simulated,
             reach,
@@ -490,7 +490,7 @@ fn filter(
             shape: section.shape.name(),
             unit,
             relative_degree: degrees[i],
-            mixed_degree: uneven.map(|found| found.describe(|input| inputs[input].name.clone())),
+            mixed_degree: mixed_degree.map(|found| found.describe(|input| inputs[input].name.clone())),
             method,
             deadline: settings.deadline,
             rate,
@@ -527,10 +527,10 @@ fn first_rows(c: &FilterConfiguration, start: Option<&[f64]>) -> Result<Filter, 
     Ok(rows)
 }
 
-/// Warnings on the method of barrier `i` from the first sample of `rows`; `uneven`: its inputs enter at different orders.
-fn of_the_method(c: &FilterConfiguration, rows: &Filter, i: usize, uneven: bool) -> Vec<String> {
+/// Warnings on the method of barrier `i` from the first sample of `rows`; `mixed_degree`: its inputs enter at different orders.
+fn of_the_method(c: &FilterConfiguration, rows: &Filter, i: usize, mixed_degree: bool) -> Vec<String> {
     let mut warnings = Vec::new();
-    if uneven && !c.is_assured() {
+    if mixed_degree && !c.is_assured() {
         let reason = c.unassured();
         warnings.push(format!(
             "inputs enter h at different orders, and without plans only the first is used: {reason}"
@@ -588,20 +588,20 @@ pub(super) fn known(c: &FilterConfiguration, refused: bool) -> Result<Vec<String
     x0.iter_mut().zip(c.plant.states()).for_each(|(x, s)| *x = plant.x0.get(&s.name).copied().unwrap_or(0.0));
     x0.extend(c.barrier_inputs().iter().map(|input| input.start));
     let c = &c.clone().armed_at_once();
-    let (uneven, mut known) = (c.uneven(), if c.is_assured() { Vec::new() } else { in_vain(c) });
+    let (mixed_degree, mut known) = (c.mixed_degree(), if c.is_assured() { Vec::new() } else { in_vain(c) });
     if c.external().is_none() {
         let rows = first_rows(c, Some(&x0))?;
         for (i, section) in c.barrier.iter().enumerate() {
-            let is_uneven = uneven.iter().any(|(barrier, _)| *barrier == i);
+            let is_mixed = mixed_degree.iter().any(|(barrier, _)| *barrier == i);
             known.extend(
-                of_the_method(c, &rows, i, is_uneven)
+                of_the_method(c, &rows, i, is_mixed)
                     .into_iter()
                     .map(|text| format!("{}: {text}", section.name)),
             );
         }
     }
     if refused {
-        known.extend(witness::in_time(c, &x0)?);
+        known.extend(backup_plan::in_time(c, &x0)?);
     }
     Ok(known)
 }
@@ -745,7 +745,7 @@ fn filter_text(report: &FilterReport) -> String {
     if let Some(run) = &report.with_damping {
         lines.push(run.head());
     }
-    lines.extend(report.backup_plan.iter().map(WitnessReport::text));
+    lines.extend(report.backup_plan.iter().map(BackupPlanReport::text));
     if let Some(map) = &report.map {
         let files = map.files.join("\n         ");
         lines.push(format!("\n{} of {} starts can be promised\nwritten: {files}", map.promised, map.of));

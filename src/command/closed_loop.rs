@@ -440,7 +440,7 @@ pub(super) fn reach(
     let filter = c.build()?;
     let t = c.experiment.start_time;
     let horizon = HORIZON * deadline;
-    let soonest = filter.earliest_arrival(index, t, x0, horizon).map_err(Error::from)?;
+    let earliest = filter.earliest_arrival(index, t, x0, horizon).map_err(Error::from)?;
     let lost = filter.is_ruled_out(index, t, x0, deadline).map_err(Error::from)?;
     if let Some((found, earliest_at_most)) = plans {
         let deadline = match () {
@@ -451,7 +451,7 @@ pub(super) fn reach(
         let (earliest_at_most, by_loop) = sooner(earliest_at_most);
         return Ok(ReachReport {
             deadline,
-            earliest_at_least: soonest,
+            earliest_at_least: earliest,
             earliest_at_most,
             by_plan: true,
             by_loop,
@@ -470,7 +470,7 @@ pub(super) fn reach(
     let begin = section.begin.filter(|_| section.after.is_none()).unwrap_or(0.0);
     let end = section.end.filter(|end| *end > 0.0 && section.after.is_none()).unwrap_or(f64::INFINITY);
     let horizon = horizon.min(end);
-    let mut low = soonest.unwrap_or(0.0).max(begin + 1e-3 * (deadline - begin)).min(horizon);
+    let mut low = earliest.unwrap_or(0.0).max(begin + 1e-3 * (deadline - begin)).min(horizon);
     let mut most = None;
     while low < horizon {
         let high = (2.0 * low).min(horizon);
@@ -488,7 +488,7 @@ pub(super) fn reach(
     let (most, by_loop) = sooner(most);
     Ok(ReachReport {
         deadline: verdict,
-        earliest_at_least: soonest,
+        earliest_at_least: earliest,
         earliest_at_most: most,
         by_plan: false,
         by_loop,

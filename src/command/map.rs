@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use punctual_core::filter::{Filter, Planning};
-use punctual_core::plan::{Failure, Witness};
+use punctual_core::plan::{BackupPlan, Failure};
 use punctual_cosim::error::Error;
 use punctual_cosim::whole;
 use punctual_fmu::configuration::{FilterConfiguration, Shape};
@@ -161,7 +161,7 @@ pub(super) fn starts(
 /// Draws `plan` from `x0` at `t` into `folder`: h, the inputs, and the path where there is a plane.
 pub(super) fn plan(
     c: &FilterConfiguration,
-    (filter, plan): (&Filter, &Witness),
+    (filter, plan): (&Filter, &BackupPlan),
     (t, x0): (f64, &[f64]),
     folder: &Path,
 ) -> Result<Vec<String>, Error> {

@@ -34,7 +34,7 @@ pub struct Arguments {
 
 /// The report on a merge, as JSON.
 #[derive(Serialize)]
-struct Told {
+struct Reported {
     file: String,
     model_name: String,
     guid: String,
@@ -59,32 +59,35 @@ struct Platform {
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let limit = (!arguments.no_trial).then_some(arguments.time_limit);
     let merged = merge::merge(&arguments.files, &arguments.output, limit)?;
-    let told = told(arguments, merged);
-    for folder in &told.left_out {
+    let reported = reported(arguments, merged);
+    for folder in &reported.left_out {
         output::note(&format!("note: left out, since it is empty: {folder}"));
     }
-    for skipped in &told.not_examined {
+    for skipped in &reported.not_examined {
         output::note(&format!("note: not examined: {skipped}"));
     }
-    if told.errors > 0 {
-        let number = told.errors;
-        output::note(&format!("note: `punctual validate {}` finds errors ({number})", told.file));
+    if reported.errors > 0 {
+        let number = reported.errors;
+        output::note(&format!("note: `punctual validate {}` finds errors ({number})", reported.file));
     }
     if arguments.json {
-        output::json(&told);
+        output::json(&reported);
     } else {
-        let platforms = told.platforms.iter().map(|p| format!("{} ({})", p.platform, p.from));
+        let platforms = reported.platforms.iter().map(|p| format!("{} ({})", p.platform, p.from));
         let platforms = platforms.collect::<Vec<_>>().join(", ");
-        output::result(&format!("{}: {} for {platforms}, guid {}", told.file, told.model_name, told.guid));
+        output::result(&format!(
+            "{}: {} for {platforms}, guid {}",
+            reported.file, reported.model_name, reported.guid
+        ));
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn told(arguments: &Arguments, merged: merge::Merged) -> Told {
+fn reported(arguments: &Arguments, merged: merge::Merged) -> Reported {
     let merge::Merged { model_name, guid, platforms, left_out, report } = merged;
     let platform =
         |(platform, from): (String, PathBuf)| Platform { platform, from: from.display().to_string() };
-    Told {
+    Reported {
         file: arguments.output.display().to_string(),
         model_name,
         guid,

@@ -1,5 +1,6 @@
 //! One file per subcommand: its arguments, and an `execute` that returns the exit code.
 
+mod backup_plan;
 pub mod build;
 pub mod campaign;
 pub mod check;
@@ -14,7 +15,6 @@ pub mod reproduce;
 pub mod run;
 pub mod shell;
 pub mod validate;
-mod witness;
 
 use std::path::Path;
 use std::sync::Arc;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::ValueEnum;
-use punctual_core::filter::Standing;
+use punctual_core::filter::AssuranceStatus;
 use punctual_cosim::coupling::{
     self, Interference, Kept, Model, Order, Outcome, Own, Promise, Simulation, System,
 };
@@ -310,7 +310,7 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
 fn is_refused(recording: &Recording) -> bool {
     let place = recording.columns().iter().position(|column| column.name == "filter.assurance");
     let first = place.and_then(|index| recording.column(index).next());
-    first == Some(f64::from(Standing::Refused as u8))
+    first == Some(f64::from(AssuranceStatus::Refused as u8))
 }
 
 /// The name of a system file without its ending. All files written begin with it.

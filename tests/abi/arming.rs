@@ -1,7 +1,7 @@
 //! A filter that is armed later than at its first step: what it shows until then, and states, resets, re-armings and
 //! derivatives on either side.
 
-use punctual_core::filter::{Phase, Standing, Status};
+use punctual_core::filter::{AssuranceStatus, Phase, Status};
 
 use crate::api::API;
 use crate::fmu::{FILTER, Fmu};
@@ -170,7 +170,7 @@ fn plans_are_decided_on_at_the_armed_step() {
         let t = f64::from(k) * 0.1;
         slave.set_inputs(&[1.0, 0.5, 0.0, 0.0, 70.0, 0.0]);
         slave.step(t, 0.1);
-        let wanted = if k < 3 { Standing::Undecided } else { Standing::Assured };
+        let wanted = if k < 3 { AssuranceStatus::Undecided } else { AssuranceStatus::Assured };
         assert_eq!(
             [slave.integer("assurance"), slave.integer("assurance_code")],
             [wanted as i32; 2],
@@ -181,8 +181,8 @@ fn plans_are_decided_on_at_the_armed_step() {
         if k < 3 {
             assert_eq!([slave.real("u.u_x"), slave.real("u.u_y")], [8.0, 0.0]);
         }
-        // It stands still although it was told to move, so the guarantee is withdrawn in the end; not before it was given.
-        if wanted == Standing::Assured {
+        // It stands still although it was told to move, so the guarantee is lost in the end; not before it was given.
+        if wanted == AssuranceStatus::Assured {
             break;
         }
     }

@@ -1,6 +1,6 @@
 //! A filter that follows plans: the filter of the core bit for bit, plans in states, what the log says, and derivatives.
 
-use punctual_core::filter::{Standing, Status};
+use punctual_core::filter::{AssuranceStatus, Status};
 
 use crate::api::{API, ERROR, OK};
 use crate::fmu::Fmu;
@@ -78,7 +78,7 @@ fn an_fmu_follows_plans_as_the_core_does() {
         }
         slave.step(t, STEP);
         slave.shows(&filter, &u, &format!("at {t}"));
-        assert_eq!(slave.integer("assurance"), Standing::Assured as i32, "{t}");
+        assert_eq!(slave.integer("assurance"), AssuranceStatus::Assured as i32, "{t}");
         assert!(slave.flag("goal.guaranteed") && slave.flag("tree.guaranteed"), "{t}");
         let status = slave.integer("status");
         assert!(Status::from_number(status).is_some_and(Status::is_satisfied), "{t}: {status}");
@@ -106,7 +106,7 @@ fn a_plan_is_saved_with_the_state() {
     other.restore(other.read(&bytes));
     assert_eq!(other.now(), bytes);
     assert_eq!(drive(&other, x, 40, 90).0, on);
-    assert_eq!(other.integer("assurance"), Standing::Assured as i32);
+    assert_eq!(other.integer("assurance"), AssuranceStatus::Assured as i32);
 }
 
 /// The slip angle of a bicycle, integrated inside: plan and integral are saved together, and the promise is kept with the mean
@@ -148,7 +148,7 @@ deadline = 7.0
     };
     let (slave, other) = (Slave::ready(&fmu), Slave::new(&fmu));
     let (_, x) = drive(&slave, [0.0, 0.0, 1.0, 0.0], 0, 40);
-    assert_eq!(slave.integer("assurance"), Standing::Assured as i32);
+    assert_eq!(slave.integer("assurance"), AssuranceStatus::Assured as i32);
     let state = slave.state();
     let bytes = slave.bytes(state);
     let (on, _) = drive(&slave, x, 40, 200);
@@ -156,7 +156,7 @@ deadline = 7.0
     assert_eq!(drive(&slave, x, 40, 200).0, on);
     other.restore(other.read(&bytes));
     assert_eq!(drive(&other, x, 40, 200).0, on);
-    assert_eq!(other.integer("assurance"), Standing::Assured as i32);
+    assert_eq!(other.integer("assurance"), AssuranceStatus::Assured as i32);
 }
 
 /// Bytes of a plan that are no plan of this filter are refused; others keep inputs finite and within their bounds.
@@ -166,7 +166,7 @@ fn damaged_plans_do_no_harm() {
     let slave = Slave::ready(&fmu);
     let (_, x) = drive(&slave, [0.0, 0.0, 1.0, 0.0], 0, 30);
     let bytes = slave.now();
-    // The commitment is the last part: most of the state.
+    // The plan state is the last part: most of the state.
     let first = bytes.len() * 2 / 5;
     let (mut refused, mut taken) = (0, 0);
     for (n, at) in (first..bytes.len() - 20).step_by(97).enumerate() {
@@ -203,7 +203,7 @@ fn what_is_not_promised_is_said_in_words() {
     let fmu = Fmu::new(&soon);
     let slave = Slave::ready(&fmu);
     drive(&slave, [0.0, 0.0, 1.0, 0.0], 0, 3);
-    assert_eq!(slave.integer("assurance"), Standing::Refused as i32);
+    assert_eq!(slave.integer("assurance"), AssuranceStatus::Refused as i32);
     assert!(!slave.flag("goal.guaranteed") && !slave.flag("tree.guaranteed"));
     // Once, not at every step.
     let [message] = &slave.log.messages()[..] else { panic!("{:?}", slave.log.messages()) };
@@ -212,42 +212,40 @@ fn what_is_not_promised_is_said_in_words() {
         "{message}"
     );
     assert_eq!(slave.log.entries()[0].category, "logStatusWarning");
-    // A new start decides anew; somebody who carries the plant away ends the promise.
+    // A new start decides again; somebody who carries the plant away ends the promise.
     let fmu = Fmu::new(ASSURED);
     let slave = Slave::ready(&fmu);
     drive(&slave, [0.0, 0.0, 1.0, 0.0], 0, 3);
     sample(&slave, [-300.0, 0.0, 0.0, 0.0]);
     slave.step(3.0 * STEP, STEP);
-    assert_eq!(slave.integer("assurance"), Standing::Withdrawn as i32);
-    assert!(
-        slave.log.messages()[0].starts_with("the guarantee is withdrawn ("),
-        "{:?}",
-        slave.log.messages()
-    );
+    assert_eq!(slave.integer("assurance"), AssuranceStatus::Lost as i32);
+    assert!(slave.log.messages()[0].starts_with("the guarantee is lost ("), "{:?}", slave.log.messages());
     // Back again, it is given again, which is said once too.
     for k in 4..6 {
         sample(&slave, [0.0, 0.0, 1.0, 0.0]);
         slave.step(f64::from(k) * STEP, STEP);
-        assert_eq!(slave.integer("assurance"), Standing::Assured as i32);
+        assert_eq!(slave.integer("assurance"), AssuranceStatus::Assured as i32);
     }
     let said = slave.log.messages();
     assert!(said.len() == 2 && said[1].starts_with("the guarantee is regained"), "{said:?}");
-    // What is read ahead of the step that decides anew is what the step says.
+    // What is read ahead of the step that decides again is what the step says.
     slave.set_flag("rearm", true);
     sample(&slave, [0.0, 0.0, 1.0, 0.0]);
     let read = (slave.integer("assurance"), slave.flag("goal.guaranteed"));
-    assert_eq!(read, (Standing::Assured as i32, true));
+    assert_eq!(read, (AssuranceStatus::Assured as i32, true));
     slave.step(6.0 * STEP, STEP);
     // A refused step has no plan behind its input.
     slave.refused(slave.try_step(7.0 * STEP, -1.0));
-    assert!(slave.integer("assurance") == Standing::Undecided as i32 && !slave.flag("goal.guaranteed"));
+    assert!(
+        slave.integer("assurance") == AssuranceStatus::Undecided as i32 && !slave.flag("goal.guaranteed")
+    );
     sample(&slave, [0.0, 0.0, 1.0, 0.0]);
     slave.step(7.0 * STEP, STEP);
-    assert_eq!(slave.integer("assurance"), Standing::Assured as i32);
+    assert_eq!(slave.integer("assurance"), AssuranceStatus::Assured as i32);
     // Late.
     sample(&slave, [0.0, 0.0, 1.0, 0.0]);
     slave.step(12.0 * STEP, STEP);
-    assert_eq!(slave.integer("assurance"), Standing::Irregular as i32);
+    assert_eq!(slave.integer("assurance"), AssuranceStatus::Irregular as i32);
 }
 
 /// A parameter may ask for what no plan accounts for: then nothing is promised, and the log says why. With `assurance = "on"`
@@ -257,13 +255,13 @@ fn parameters_that_no_plan_accounts_for() {
     let erroneous = ASSURED
         .replace("experiment", "sampling = \"measured\"\nmeasurement_errors = { v = 0.0 }\nexperiment");
     let left = erroneous.replace("assurance = \"on\"\n", "");
-    for (v, standing) in [(0.0, Standing::Assured), (0.01, Standing::Refused)] {
+    for (v, status) in [(0.0, AssuranceStatus::Assured), (0.01, AssuranceStatus::Refused)] {
         let fmu = Fmu::new(&left);
         let slave = Slave::new(&fmu);
         slave.set("measurement_error.v", v);
         slave.initialize();
         drive(&slave, [0.0, 0.0, 1.0, 0.0], 0, 3);
-        assert_eq!(slave.integer("assurance"), standing as i32);
+        assert_eq!(slave.integer("assurance"), status as i32);
         assert_eq!(slave.flag("goal.guaranteed"), v == 0.0);
         let said = slave.log.messages().concat();
         let why = "the guarantee is refused (no plan was found at the start: nothing is promised): measurement_errors.v is 0.01, must be 0 for a plan";
@@ -330,7 +328,7 @@ fn a_promise_with_an_end_tells_it() {
     let mut until = 0.0;
     for k in 0..12 {
         (_, x) = drive(&slave, x, 25 * k, 25 * (k + 1));
-        assert_eq!(slave.integer("assurance"), Standing::Assured as i32);
+        assert_eq!(slave.integer("assurance"), AssuranceStatus::Assured as i32);
         let now = slave.real("assured_until");
         assert!(now >= until && now > slave.time(), "from {until} to {now}");
         until = now;

@@ -189,7 +189,7 @@ fn are_given_at_every_step() {
     let free = "plant.model = \"unicycle\"\n";
     let off = "assurance = \"off\"\n";
     let errors = "[measurement_errors]\nx_p = 0.05\ny_p = 0.05\nv = 0.02\n";
-    let soonest = goal.replace("6.0", "0.7\nwhen_infeasible = \"earliest\"");
+    let earliest = goal.replace("6.0", "0.7\nwhen_infeasible = \"earliest\"");
     let rated = rock.replace("radius", "stay_rate = 3.0\nmargin = 0.1\nradius");
     let (mut smooth, mut near, mut random) = (0_u32, 0_u32, Random(50));
     // Whether a search holds something: a plan, or a later deadline.
@@ -199,7 +199,7 @@ fn are_given_at_every_step() {
         (false, format!("{off}{bicycle}{goal}{rock}")),
         (false, format!("{free}{goal}{rock}")),
         (false, format!("{unicycle}{errors}{goal}{rock}")),
-        (true, format!("{off}{point}{soonest}{rated}")),
+        (true, format!("{off}{point}{earliest}{rated}")),
         (false, format!("{off}{unicycle}sampling = \"pointwise\"\n{goal}{rock}")),
         (true, format!("{unicycle}{goal}{rock}")),
         (true, format!("{point}{goal}{rated}")),

@@ -164,7 +164,7 @@ fn is_mapped(path: &Path) -> bool {
     std::fs::read_to_string("/proc/self/maps").unwrap().contains(path.to_str().unwrap())
 }
 
-/// Runs by itself in a process of its own, started by [`unloads_and_loads_again`]: counts of threads
+/// Runs by itself in a separate process, started by [`unloads_and_loads_again`]: counts of threads
 /// and mappings belong to the process.
 #[test]
 #[ignore = "started by unloads_and_loads_again"]

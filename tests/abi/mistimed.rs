@@ -212,7 +212,7 @@ fn a_plant_takes_no_other_time() {
         assert!(message.contains("must be") && message.contains("the present one, 1.125"), "{message}");
     }
     slave.step(1.125, 0.125);
-    // A reset instance has made no step that a state from before could take back. A new run tells it anew.
+    // A reset instance has made no step that a state from before could take back. A new run tells it again.
     slave.ok((API.reset)(slave.component));
     slave.restore(state);
     slave.refused(slave.try_step(1.25, 0.125));

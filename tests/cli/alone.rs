@@ -442,7 +442,7 @@ expression = "2 - x + speed * t"
 deadline = 12.0
 "#;
     let reason =
-        "goal moves with time, so that no plan ends; with a horizon one may end before (`plan_horizon`)";
+        "goal moves with time, so that no plan ends; with a horizon one may end earlier (`plan_horizon`)";
     workshop.write("moving.toml", text);
     let checked = workshop.punctual(["check", "moving.toml"]).success();
     assert!(checked.contains(&format!("plans: none, since {reason}\n")), "{checked}");

@@ -162,7 +162,7 @@ fn a_campaign_counts_where_promises_stood() {
         let possible =
             matches!(cell("filter.goal.deadline"), Cell::Number(Some(deadline)) if *deadline == 8.0);
         assert_eq!((count("assured") > 0, count("refused") > 0), (possible, !possible), "{row:?}");
-        assert_eq!(count("withdrawn") + count("irregular"), 0, "{row:?}");
+        assert_eq!(count("lost") + count("irregular"), 0, "{row:?}");
         assert!(!possible || matches!(cell("success"), Cell::Flag(true)), "{row:?}");
         let again = workshop.punctual(["replay", "c.parquet", "--run", &number.to_string()]).success();
         assert!(again.contains("the row is as recorded, bit for bit"), "{again}");

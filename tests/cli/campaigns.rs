@@ -552,7 +552,7 @@ fn a_report_has_the_runs_and_how_to_see_them_again() {
     let first = commands.iter().find_map(|node| node.text()).expect("a command");
     assert_eq!(first, format!("punctual replay c.parquet --run {} --out out", report["worst"][0]["run"]));
     workshop.punctual(first.split(' ').skip(1)).success();
-    // It is written anew without a run; and only where it does not take the place of the rows.
+    // It is written again without a run; and only where it does not take the place of the rows.
     fs::remove_file(workshop.path("c.html")).expect("the page");
     workshop.punctual(["campaign", "c.toml", "--report"]).success();
     assert_eq!(workshop.text("c.html"), page);
@@ -972,7 +972,7 @@ fn runs_that_end_before_a_deadline_say_so() {
 
 /// A wall that noise alone comes to: as often by `--rare` as by plain sampling, and the worst course again.
 #[test]
-fn a_rare_course_of_noise_is_estimated_and_shown() {
+fn a_rare_sequence_of_noise_is_estimated_and_shown() {
     let workshop = Workshop::new();
     // x(2) is a fifth of the sum of ten numbers uniform from -1 to 1: about one in 100 comes to 0.84.
     let text = drifting(&workshop, 0.84);
@@ -1135,7 +1135,7 @@ fn a_campaign_takes_fmus_of_others() {
 
 /// A course of values: what may change in a run takes it, at the times that it says.
 #[test]
-fn a_course_is_the_same_in_every_run() {
+fn a_sequence_is_the_same_in_every_run() {
     let workshop = Workshop::new();
     let text = drifting(&workshop, 9.0).replace("runs = 1\n", "runs = 2\n");
     let (system, _) = text.split_once("[vary.").expect("the first table");

@@ -252,32 +252,39 @@ fn a_plan_keeps_every_promise_or_is_not_found() {
         (report["backup_plan"].clone(), workshop.punctual(words).stdout)
     };
     // Ample bounds: a plan, and a sooner one. At rest past the deadline, within the bounds.
-    let (witness, text) = with("8.0", "");
+    let (backup_plan, text) = with("8.0", "");
     assert!(
         text.contains("backup plan: found; within the bounds, it keeps every promise, whatever u_ref is\n"),
         "{text}"
     );
-    assert_eq!(witness["found"], true);
-    let factor = |witness: &Value| witness["earliest_factor"].as_f64();
-    assert!(factor(&witness).is_some_and(|f| f < 1.0), "{witness}");
-    let plan = &witness["plan"];
-    assert!(plan["at_equilibrium_from"].as_f64() > Some(10.0), "{witness}");
-    assert!(plan["inputs"][0][1].as_f64().is_some_and(|peak| 0.0 < peak && peak <= 8.0), "{witness}");
+    assert_eq!(backup_plan["found"], true);
+    let factor = |backup_plan: &Value| backup_plan["earliest_factor"].as_f64();
+    assert!(factor(&backup_plan).is_some_and(|f| f < 1.0), "{backup_plan}");
+    let plan = &backup_plan["plan"];
+    assert!(plan["at_equilibrium_from"].as_f64() > Some(10.0), "{backup_plan}");
+    assert!(plan["inputs"][0][1].as_f64().is_some_and(|peak| 0.0 < peak && peak <= 8.0), "{backup_plan}");
     // At 0.8 m/s² the edge, 61.6 m away, is passed after 12.4 s at the earliest, after 14.95 s by who stops straight ahead inside, and
     // sooner by who turns there.
-    let (witness, text) = with("0.8", "");
+    let (backup_plan, text) = with("0.8", "");
     assert!(
         text.contains("backup plan: NONE was found: in the closest attempt, goal is not met at "),
         "{text}"
     );
-    assert_eq!(witness["found"], false);
-    assert!(factor(&witness).is_some_and(|f| (1.24..1.65).contains(&f)), "{witness}");
-    let soonest = witness["earliest"][0][1].as_f64();
-    assert!(soonest.zip(factor(&witness)).is_some_and(|(s, f)| (s - 10.0 * f).abs() < 1e-9), "{witness}");
+    assert_eq!(backup_plan["found"], false);
+    assert!(factor(&backup_plan).is_some_and(|f| (1.24..1.65).contains(&f)), "{backup_plan}");
+    let earliest = backup_plan["earliest"][0][1].as_f64();
+    assert!(
+        earliest.zip(factor(&backup_plan)).is_some_and(|(s, f)| (s - 10.0 * f).abs() < 1e-9),
+        "{backup_plan}"
+    );
     // What no plan accounts for is said.
-    let (witness, text) = with("8.0", "\ndisturbance = 0.1 #");
+    let (backup_plan, text) = with("8.0", "\ndisturbance = 0.1 #");
     let reason = "goal.disturbance is 0.1, must be 0 for a plan";
-    assert_eq!((&witness["found"], &witness["reason"]), (&false.into(), &reason.into()), "{witness}");
+    assert_eq!(
+        (&backup_plan["found"], &backup_plan["reason"]),
+        (&false.into(), &reason.into()),
+        "{backup_plan}"
+    );
     assert!(text.contains(&format!("backup plan: NONE was found: {reason}\n")), "{text}");
 }
 
@@ -364,14 +371,14 @@ fn a_barrier_that_begins_later_or_ends_is_judged() {
         assert_eq!(barrier["deadline"].as_f64(), Some(deadline));
         let lists =
             [&barrier["start"]["reach"]["earliest_at_most"], &report["backup_plan"]["earliest"][0][1]];
-        for soonest in lists.iter().filter_map(|value| value.as_f64()) {
+        for earliest in lists.iter().filter_map(|value| value.as_f64()) {
             let range = begin.unwrap_or(0.0)..=end.unwrap_or(f64::INFINITY);
-            assert!(range.contains(&soonest), "{window}: {soonest}");
+            assert!(range.contains(&earliest), "{window}: {earliest}");
         }
     }
 }
 
-/// A gap of 90 m of which the car feels nothing yet: the rate is the one that acts, and a soonest deadline is no later than
+/// A gap of 90 m of which the car feels nothing yet: the rate is the one that acts, and a earliest deadline is no later than
 /// the arrival beside it.
 #[test]
 fn what_check_says_is_what_acts() {
@@ -398,8 +405,9 @@ derivatives = { G = "-0.0317*(G-81)-X*G", X = "-0.0123*X+0.00000492*(I-7)", I = 
     let report = workshop.punctual(["check", "glucose.toml", "--json"]).success();
     let report: Value = serde_json::from_str(&report).expect("JSON");
     let arrival = report["closed_loop"]["barriers"][0]["arrival"].as_f64().expect("it arrives");
-    let soonest = report["barriers"][0]["start"]["reach"]["earliest_at_most"].as_f64().expect("a soonest");
-    assert!((18.0..19.0).contains(&arrival) && soonest <= arrival + 1e-9, "{soonest} s, {arrival} s");
+    let earliest =
+        report["barriers"][0]["start"]["reach"]["earliest_at_most"].as_f64().expect("an earliest one");
+    assert!((18.0..19.0).contains(&arrival) && earliest <= arrival + 1e-9, "{earliest} s, {arrival} s");
     assert!(report["backup_plan"]["earliest"][0][1].as_f64().is_some_and(|at| at <= arrival + 1e-9));
     assert_eq!(report["warnings"].as_array().map(Vec::len), Some(0), "{report}");
 }

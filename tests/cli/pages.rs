@@ -15,7 +15,7 @@ fn assert_told(shown: &str, told: &str) {
 fn the_tutorial_is_what_happens() {
     let (workshop, text) = (Workshop::with_library(), document("tutorial.md"));
     let shown = blocks(&text, "text");
-    let [witness, verdicts, sooner, refused, around, never] = shown[..] else { panic!("{shown:?}") };
+    let [backup_plan, verdicts, sooner, refused, around, never] = shown[..] else { panic!("{shown:?}") };
     let made = workshop.punctual(["new", "car.toml"]).success();
     assert!(text.contains(&format!("$ punctual new car.toml\n{made}```")), "{made}");
     let file = workshop.text("car.toml");
@@ -29,7 +29,7 @@ fn the_tutorial_is_what_happens() {
         assert_eq!(done.code, code, "{done:#?}");
         done
     };
-    assert_told(witness, &check(0).stdout);
+    assert_told(backup_plan, &check(0).stdout);
     assert_told(verdicts, &run());
     assert!(workshop.path("car/car-path.svg").exists() && workshop.path("car/car-h.svg").exists());
 

@@ -147,7 +147,7 @@ fn what_does_not_fit_is_refused_with_both_units() {
 }
 
 #[test]
-fn a_factor_of_the_file_stands_and_an_offset_comes_after_the_units() {
+fn a_factor_of_the_file_is_used_and_an_offset_comes_after_the_units() {
     let workshop = workshop();
     let first = |more: &str| {
         let text = system("centi.toml", START_CENTI, "gauss-seidel", &wired("filter.x.p", more));

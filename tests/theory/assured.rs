@@ -1,4 +1,4 @@
-//! Filters with a witness, by the figures that they are measured by: how many starts they accept of those that are
+//! Filters with a backup plan, by the figures that they are measured by: how many starts they accept of those that are
 //! possible, whether all that is accepted is kept, and what a step takes.
 //!
 //! Each table has a quick size for every run of the tests and a full one for `tests/nightly`. `PUNCTUAL_ASSURED`

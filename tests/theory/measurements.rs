@@ -18,7 +18,7 @@ const MARGIN: f64 = 0.02;
 /// The kinds of errors of the measurement.
 #[derive(Clone, Copy, Debug)]
 enum Noise {
-    /// Anywhere within the bound, anew every so many samples.
+    /// Anywhere within the bound, again every so many samples.
     Uniform(usize),
     /// As far as it can in these directions, one sign for each state, all the time.
     Biased,

@@ -1,4 +1,4 @@
-//! Savings by the profile of least peak: peak inputs of the hundred starts, and the soonest deadline.
+//! Savings by the profile of least peak: peak inputs of the hundred starts, and the earliest deadline.
 
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::ControlAffine;

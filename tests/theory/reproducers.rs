@@ -209,7 +209,7 @@ fn dips_between_samples() {
     assert_eq!(found, [0; 3]);
 }
 
-/// A barrier that was left begins anew, and does not claim that it had been kept.
+/// A barrier that was left starts over, and does not claim that it had been kept.
 #[test]
 fn recovery_does_not_claim_what_was_lost() {
     let mut numbers = Numbers::new(11);

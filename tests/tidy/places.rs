@@ -70,7 +70,7 @@ fn identifiers_are_ascii() {
     }
 }
 
-/// A test may be left to another one that runs it in a process of its own, and says so.
+/// A test may be left to another one that runs it in a separate process, and says so.
 #[test]
 fn no_test_is_ignored() {
     for source in &*SOURCES {

@@ -108,7 +108,7 @@ impl QuadraticDisc {
 }
 
 impl<const NX: usize> Barrier<NX> for QuadraticDisc {
-    const BENDS_ONE_WAY: bool = true;
+    const ONE_SIDED_CURVATURE: bool = true;
 
     #[inline(always)]
     fn value<S: Scalar>(&self, t: S, x: &[S; NX]) -> S {
@@ -170,7 +170,7 @@ impl DistanceDisc {
 }
 
 impl<const NX: usize> Barrier<NX> for DistanceDisc {
-    const BENDS_ONE_WAY: bool = true;
+    const ONE_SIDED_CURVATURE: bool = true;
 
     #[inline(always)]
     fn value<S: Scalar>(&self, t: S, x: &[S; NX]) -> S {

@@ -31,7 +31,7 @@ use crate::scalar::Scalar;
 pub struct Outside<B>(pub B);
 
 impl<B: Barrier<NX>, const NX: usize> Barrier<NX> for Outside<B> {
-    const BENDS_ONE_WAY: bool = B::BENDS_ONE_WAY;
+    const ONE_SIDED_CURVATURE: bool = B::ONE_SIDED_CURVATURE;
 
     #[inline(always)]
     fn value<S: Scalar>(&self, t: S, x: &[S; NX]) -> S {

@@ -41,7 +41,7 @@ impl HalfPlane {
 }
 
 impl<const NX: usize> Barrier<NX> for HalfPlane {
-    const BENDS_ONE_WAY: bool = true;
+    const ONE_SIDED_CURVATURE: bool = true;
 
     fn value<S: Scalar>(&self, _t: S, x: &[S; NX]) -> S {
         (x[0] - self.point[0]) * self.normal[0] + (x[1] - self.point[1]) * self.normal[1]
@@ -106,7 +106,7 @@ impl Ellipse {
 }
 
 impl<const NX: usize> Barrier<NX> for Ellipse {
-    const BENDS_ONE_WAY: bool = true;
+    const ONE_SIDED_CURVATURE: bool = true;
 
     fn value<S: Scalar>(&self, _t: S, x: &[S; NX]) -> S {
         let [along, across] = self.axes.along(x);
@@ -151,7 +151,7 @@ impl Rectangle {
 }
 
 impl<const NX: usize> Barrier<NX> for Rectangle {
-    const BENDS_ONE_WAY: bool = true;
+    const ONE_SIDED_CURVATURE: bool = true;
 
     fn value<S: Scalar>(&self, _t: S, x: &[S; NX]) -> S {
         let [along, across] = self.axes.along(x);
@@ -196,7 +196,7 @@ impl StateBound {
 }
 
 impl<const NX: usize> Barrier<NX> for StateBound {
-    const BENDS_ONE_WAY: bool = true;
+    const ONE_SIDED_CURVATURE: bool = true;
 
     /// Not a number for a state that the plant does not have.
     fn value<S: Scalar>(&self, _t: S, x: &[S; NX]) -> S {
@@ -242,7 +242,7 @@ impl NormBound {
 }
 
 impl<const NX: usize> Barrier<NX> for NormBound {
-    const BENDS_ONE_WAY: bool = true;
+    const ONE_SIDED_CURVATURE: bool = true;
 
     /// Not a number for states that the plant does not have.
     fn value<S: Scalar>(&self, _t: S, x: &[S; NX]) -> S {

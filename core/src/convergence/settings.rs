@@ -52,7 +52,7 @@ pub enum Infeasible {
     /// not ruled out; the factor grows by half each further time. A deadline that passes outside is given up as well.
     /// Where no bound is known, the new one has the configured length. Counted in
     /// [`FixedTimeState::postponed`](super::FixedTimeState::postponed).
-    Soonest,
+    Earliest,
 }
 
 /// Settings of one barrier's promise.

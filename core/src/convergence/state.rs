@@ -23,7 +23,7 @@ pub struct FixedTimeState {
     /// ([`FixedTimeSettings::recovery`](super::FixedTimeSettings::recovery)).
     pub recoveries: u32,
     /// Number of deadlines given up for a later one, because the input bounds do not allow them
-    /// ([`Infeasible::Soonest`](super::Infeasible::Soonest)).
+    /// ([`Infeasible::Earliest`](super::Infeasible::Earliest)).
     pub postponed: u32,
     /// (h − μ)⁽ʲ⁾ at the anchor for j < n.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]

@@ -138,7 +138,7 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// Makes the last barrier added follow a profile of one's own ([`FixedTime::with_profile`]).
+    /// Makes the last barrier added follow a custom profile ([`FixedTime::with_profile`]).
     ///
     /// # Errors
     ///
@@ -166,7 +166,7 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// Puts a constraint of one's own in the place of the last barrier's method
+    /// Puts a custom constraint in the place of the last barrier's method
     /// ([`FixedTime::with_condition`]), such as one of the crate `punctual-reference`.
     ///
     /// # Errors
@@ -255,7 +255,7 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// Sets the standing of the last barrier added where not all can be met. Default: [`Strictness::KeepFirst`].
+    /// Sets how the last barrier added is treated where not all can be met. Default: [`Strictness::KeepFirst`].
     ///
     /// # Errors
     ///
@@ -287,7 +287,7 @@ impl FilterBuilder {
     ///
     /// # Errors
     ///
-    /// A slice of the wrong length, not-a-number, a lower bound above its upper bound, a lower bound
+    /// A slice of the wrong length, NaN, a lower bound above its upper bound, a lower bound
     /// of +infinity or an upper bound of −infinity.
     pub fn bounds(mut self, min: &[f64], max: &[f64]) -> Result<Self, Error> {
         length("u_min", min.len(), self.input_dim)?;
@@ -334,7 +334,7 @@ impl FilterBuilder {
     }
 
     /// Sets the longest time in s that may pass between two samples, finite, > 0: promises then hold for steps of any
-    /// length up to it. A longer one withdraws them until the next sample shows that they can be given again.
+    /// length up to it. A longer one suspends them until the next sample shows that they can be given again.
     /// Default: the period that [`Sampling`] assumes.
     ///
     /// # Errors
@@ -380,8 +380,8 @@ impl FilterBuilder {
     /// Bounds the errors of the measured state: |x̂_i − x_i| ≤ `errors[i]` at every sample, finite, ≥ 0, in the unit
     /// of x_i. The promises then hold for the true state, to first order in the errors. Default: none.
     ///
-    /// Needs a prediction over the period, and a method that allows for errors: the reference profile, or a condition
-    /// of one's own that says so. `deadline_unreachable` then stays false until the
+    /// Needs a prediction over the period, and a method that allows for errors: the reference profile, or a custom
+    /// condition that says so. `deadline_unreachable` then stays false until the
     /// deadline has passed, and there are no directional derivatives. A step takes some four times the work per
     /// measured state.
     ///

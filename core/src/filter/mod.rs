@@ -23,11 +23,11 @@ pub use crate::convergence::{
     FixedTimeSettings as BarrierSettings, Infeasible, Method, Phase, ProfileKind, Refusal,
 };
 #[cfg(feature = "plan")]
-pub use backup::{Assurance, Commitment, Driver, Planning, Plans, Reason, Standing};
+pub use backup::{Assurance, AssuranceStatus, Driver, PlanState, Planning, Plans, Reason};
 pub use builder::FilterBuilder;
 pub use integrator::Integration;
 pub use report::{BarrierReport, Report, Status};
-pub use rows::{BarrierDerivative, Begin, Bend, End, NoDerivative, SampleDerivative, Strictness};
+pub use rows::{BarrierDerivative, Begin, Curvature, End, NoDerivative, SampleDerivative, Strictness};
 pub use sampling::Sampling;
 pub use state::FilterState;
 
@@ -61,7 +61,7 @@ const SAME_PERIOD: f64 = 1e-6;
 ///
 /// # References
 ///
-/// The paper, section III; the module [`crate::convergence`]; `docs/theory.md#witness` for plans.
+/// The paper, section III; the module [`crate::convergence`]; `docs/theory.md#backup-plan` for plans.
 pub struct Filter {
     rows: Rows,
     integrator: Option<Integrator>,
@@ -110,7 +110,7 @@ impl Filter {
     /// - `u_ref`: the input wanted by whoever is in control.
     /// - `u`: receives the safe input: always finite and within the bounds.
     ///
-    /// Does not allocate, except for plans. Numerical outcomes (infeasible, no control authority, not-a-number
+    /// Does not allocate, except for plans. Numerical outcomes (infeasible, no control authority, NaN
     /// inputs) are the report's [`Status`], never an error.
     ///
     /// # Errors
@@ -241,7 +241,7 @@ impl Filter {
     ///
     /// Exact for the piece in force. The input is a piecewise smooth function. Where rows, bounds, a phase or the
     /// better of two searches change, it has a kink or a jump; the derivative is that of the piece on which the
-    /// sample was computed. A later deadline that was found at this sample ([`Infeasible::Soonest`](Infeasible::Soonest))
+    /// sample was computed. A later deadline that was found at this sample ([`Infeasible::Earliest`](Infeasible::Earliest))
     /// is held. Where more rows are active than inputs can follow, the first ones count.
     ///
     /// The change of the rate and margin chosen for a set that is kept ([`stay::keep`](crate::convergence::stay::keep)) is a
@@ -336,13 +336,13 @@ impl Filter {
     /// Forgets the anchors: the next sample with valid inputs starts every deadline again. An integrated input stays. The time until the
     /// filter is [armed](FilterBuilder::arm_after) counts from its first sample all the same.
     ///
-    /// With plans the next valid sample decides what is promised. If it finds no other plan, the one at hand is followed as long as
-    /// it keeps what is promised then; and where x is not finite, it is followed until there is a valid sample. A set that x
-    /// is inside of then is to be kept from there on, also one that was to be left once more before its deadline.
+    /// With plans the next valid sample decides what is promised. If it finds no other plan, the current one is followed as
+    /// long as it keeps what is promised then; and where x is not finite, it is followed until there is a valid sample. A
+    /// set that x is inside of then is to be kept from there on, also one that was to be left once more before its deadline.
     pub fn rearm(&mut self) {
         let state = &mut self.rows.state;
         state.barriers.fill(FixedTimeState::default());
-        (state.time, state.period, state.bends) = (None, None, [None; 2]);
+        (state.time, state.period, state.curvatures) = (None, None, [None; 2]);
         state.input.fill(0.0);
         #[cfg(feature = "plan")]
         if let Some(backup) = &mut self.backup {
@@ -376,7 +376,7 @@ impl Filter {
         match &mut self.backup {
             Some(backup) => backup.restart(&self.rows.state.plan),
             // Rows alone follow none.
-            None => self.rows.state.plan = Commitment::default(),
+            None => self.rows.state.plan = PlanState::default(),
         }
         Ok(())
     }
@@ -452,7 +452,7 @@ impl Filter {
         slot.source = source;
         self.rows.workspace.search.evaluations.plants = SharedPlants::of(&mut self.rows.slots);
         self.rows.state.barriers[index] = FixedTimeState::default();
-        self.rows.state.bends = [None; 2];
+        self.rows.state.curvatures = [None; 2];
         Ok(())
     }
 

@@ -9,7 +9,7 @@ use crate::{MAX_INPUTS, reach};
 
 impl Filter {
     /// A time in s before which no input within the bounds brings barrier number `index` to h ≥ 0 from the
-    /// state `x` at `t` ([`reach::soonest`]), at most `horizon` (s, finite, > 0); `None` where that is not
+    /// state `x` at `t` ([`reach::earliest_arrival`]), at most `horizon` (s, finite, > 0); `None` where that is not
     /// known (with a disturbance too) or there is no such barrier.
     ///
     /// # Errors
@@ -25,7 +25,7 @@ impl Filter {
         length("x", x.len(), self.rows.state_dim)?;
         let horizon = positive("horizon", horizon)?;
         let slot = self.rows.slots.get(index).filter(|c| c.is_undisturbed());
-        Ok(slot.and_then(|c| reach::soonest(&*c.source, (t, x), &self.rows.bounds, horizon)))
+        Ok(slot.and_then(|c| reach::earliest_arrival(&*c.source, (t, x), &self.rows.bounds, horizon)))
     }
 
     /// Whether the input bounds certainly do not allow h ≥ 0 of barrier number `index` at `after` s, finite, ≥ 0,
@@ -87,7 +87,7 @@ impl Filter {
     }
 
     /// The reason why barrier `index` goes by another method than the configured one since its anchor
-    /// ([`BarrierReport::fallback`]); `None` where it does not. Computed anew: not for every step.
+    /// ([`BarrierReport::fallback`]); `None` where it does not. Recomputed at every call: not for every step.
     pub fn refusal(&self, index: usize) -> Option<Refusal> {
         self.rows.slots.get(index)?.promise.refusal(self.rows.state.barriers.get(index)?)
     }

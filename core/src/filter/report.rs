@@ -106,7 +106,7 @@ impl Status {
         )
     }
 
-    /// Whether the returned input satisfies every constraint, or a plan that keeps every promise stands behind it.
+    /// Whether the returned input satisfies every constraint, or a plan that keeps every promise backs it.
     pub fn is_satisfied(self) -> bool {
         matches!(self, Self::Unchanged | Self::Filtered | Self::Backup)
     }
@@ -135,8 +135,8 @@ pub struct BarrierReport {
     /// Time in s of the first sample with h ≥ 0 since the anchor.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub arrival_time: Option<f64>,
-    /// Whether a witness is in hand: a plan, checked in the model, that keeps this barrier's promise within the bounds
-    /// whatever u_ref is. Only from a filter that follows plans ([`Filter::with_plans`](super::Filter::with_plans)).
+    /// Whether there is a backup plan: one that was checked in the model, that keeps this barrier's promise within the
+    /// bounds whatever u_ref is. Only from a filter that follows plans ([`Filter::with_plans`](super::Filter::with_plans)).
     pub guaranteed: bool,
     /// Whether the theorem behind the present phase applies: its conditions held at a sample of this phase, and every step
     /// since then was satisfied. It does not say that an input will exist at later samples.
@@ -334,7 +334,7 @@ impl Report {
         }
     }
 
-    /// Resets all but the barriers, which a sample writes anew.
+    /// Resets all but the barriers, which a sample rewrites.
     pub(super) fn reset(&mut self, t: f64) {
         self.time = t;
         self.status = Status::Unchanged;

@@ -74,13 +74,13 @@ impl Sampling {
         }
     }
 
-    /// The longest time in s that a hold of `hold` s may turn out to last; `told`: somebody gave its length.
-    pub(super) fn longest(self, hold: f64, told: bool) -> f64 {
+    /// The longest time in s that a hold of `hold` s may turn out to last; `reported`: somebody gave its length.
+    pub(super) fn longest(self, hold: f64, reported: bool) -> f64 {
         /// Longest next step over the measured one, seldom exceeded where steps are drawn at random between half of the
         /// longest and the longest.
         const JITTER: f64 = 1.25;
         match self {
-            Self::Measured { .. } if !told => JITTER * hold,
+            Self::Measured { .. } if !reported => JITTER * hold,
             _ => hold,
         }
     }

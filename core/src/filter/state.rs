@@ -3,8 +3,8 @@
 use alloc::vec::Vec;
 
 #[cfg(feature = "plan")]
-use super::backup::Commitment;
-use super::{Bend, SAME_TIME};
+use super::backup::PlanState;
+use super::{Curvature, SAME_TIME};
 use crate::MAX_INPUTS;
 use crate::convergence::FixedTimeState;
 
@@ -31,17 +31,18 @@ pub struct FilterState {
     /// Time of the first sample in s, valid or not, where the filter is [armed later](super::FilterBuilder::arm_after) than that.
     #[cfg_attr(feature = "serde", serde(default, with = "crate::real"))]
     pub start: Option<f64>,
-    /// How the active row bent at the sample before [`Self::time`] and at that, where one alone was active: the search over the
-    /// period begins from the former if that sample is taken again, else from the latter. Promises do not depend on it.
+    /// How the active row was curved at the sample before [`Self::time`] and at that, where one alone was active: the
+    /// search over the period begins from the former if that sample is taken again, else from the latter. Promises do not
+    /// depend on it.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub bends: [Option<Bend>; 2],
+    pub curvatures: [Option<Curvature>; 2],
     /// The [integrated input](super::Integration) at the end of the last hold, in its unit; 0 where no input is integrated.
     #[cfg_attr(feature = "serde", serde(default, with = "crate::real"))]
     pub integrated: f64,
     /// The backup plan and what it keeps; blank where the filter follows no plans.
     #[cfg(feature = "plan")]
     #[cfg_attr(feature = "serde", serde(default))]
-    pub plan: Commitment,
+    pub plan: PlanState,
 }
 
 impl Clone for FilterState {
@@ -69,14 +70,14 @@ impl FilterState {
             period,
             input,
             start,
-            bends,
+            curvatures,
             integrated,
             #[cfg(feature = "plan")]
                 plan: _,
         } = source;
         self.barriers.clone_from(barriers);
         (self.time, self.period, self.input, self.start) = (*time, *period, *input, *start);
-        (self.bends, self.integrated) = (*bends, *integrated);
+        (self.curvatures, self.integrated) = (*curvatures, *integrated);
     }
 
     /// Whether a filter that is armed `after` seconds from its first sample is so at `t`: once it is, it stays so.
@@ -86,10 +87,10 @@ impl FilterState {
         after == 0.0 || self.time.is_some() || self.start.is_none_or(reached)
     }
 
-    /// The bend of the active row from which the search at `t` begins.
+    /// The curvature of the active row from which the search at `t` begins.
     #[inline]
-    pub(super) fn bend_before(&self, t: f64) -> &Option<Bend> {
-        let [before, last] = &self.bends;
+    pub(super) fn curvature_before(&self, t: f64) -> &Option<Curvature> {
+        let [before, last] = &self.curvatures;
         if self.time.is_some_and(|time| t > time) { last } else { before }
     }
 
@@ -98,6 +99,6 @@ impl FilterState {
     pub(super) fn take_rows(&mut self, next: &mut Self) {
         core::mem::swap(&mut self.barriers, &mut next.barriers);
         (self.time, self.period, self.input, self.start) = (next.time, next.period, next.input, next.start);
-        (self.bends, self.integrated) = (next.bends, next.integrated);
+        (self.curvatures, self.integrated) = (next.curvatures, next.integrated);
     }
 }

@@ -15,7 +15,7 @@
 
 use core::array::from_fn;
 
-use super::{COURSE, Course, CourseOver, Direction, RateOver, enclosure};
+use super::{Direction, EXPANSION_ORDERS, Expansion, ExpansionOver, RateOver, enclosure};
 use crate::barrier::Barrier;
 use crate::dynamics::{ControlAffine, first, rk4};
 use crate::interval::Interval;
@@ -100,9 +100,9 @@ pub fn is_even<S: Scalar>([k1, k2, k3, k4]: [&[S]; 4]) -> bool {
     let (mut most, mut largest) = (0.0_f64, 0.0_f64);
     for (((k1, k2), k3), k4) in k1.iter().zip(k2).zip(k3).zip(k4) {
         let [k1, k2, k3, k4] = [k1, k2, k3, k4].map(|k| k.value());
-        let bend = (k1 - k2 - k3 + k4).abs() + MIDDLE * (k2 - k3).abs();
-        most = most.max(bend);
-        largest = largest.max(k1.abs().max(k4.abs()).min(COUNTS * bend));
+        let curvature = (k1 - k2 - k3 + k4).abs() + MIDDLE * (k2 - k3).abs();
+        most = most.max(curvature);
+        largest = largest.max(k1.abs().max(k4.abs()).min(COUNTS * curvature));
     }
     most <= EVEN * largest
 }
@@ -302,14 +302,14 @@ pub(super) fn path<P, const NX: usize, const NU: usize>(
     plant: &P,
     x: &[f64; NX],
     u: &[f64],
-    out: &mut [Course],
+    out: &mut [Expansion],
 ) where
     P: ControlAffine<NX, NU>,
 {
-    let mut path = from_fn::<Taylor<f64, COURSE>, NX, _>(|i| Taylor::constant(x[i]));
+    let mut path = from_fn::<Taylor<f64, EXPANSION_ORDERS>, NX, _>(|i| Taylor::constant(x[i]));
     macro_rules! extend_to {
         ($($j:literal),*) => {{
-            const { assert!([$($j),*].len() == COURSE - 1, "an order each") };
+            const { assert!([$($j),*].len() == EXPANSION_ORDERS - 1, "an order each") };
             $({
                 let known = from_fn::<Taylor<f64, $j>, NX, _>(|i| path[i].truncated());
                 let (f, g) = (plant.drift(&known), plant.input_map(&known));
@@ -331,17 +331,17 @@ pub(super) fn path<P, const NX: usize, const NU: usize>(
 
 /// The expansion of `barrier` along `path`, from `t` on. Once for a barrier, whatever the plants and degrees.
 #[inline(never)]
-pub(super) fn value_along<B, const NX: usize>(barrier: &B, t: f64, path: &[Course]) -> Course
+pub(super) fn value_along<B, const NX: usize>(barrier: &B, t: f64, path: &[Expansion]) -> Expansion
 where
     B: Barrier<NX>,
 {
-    let states = from_fn::<Taylor<f64, COURSE>, NX, _>(|i| Taylor { coefficients: path[i] });
+    let states = from_fn::<Taylor<f64, EXPANSION_ORDERS>, NX, _>(|i| Taylor { coefficients: path[i] });
     barrier.value(Taylor::time(t), &states).coefficients
 }
 
 /// The first `K` coefficients of the expansions of the states.
 #[inline(always)]
-fn first_over<const NX: usize, const K: usize>(path: &[CourseOver]) -> [Taylor<Interval, K>; NX] {
+fn first_over<const NX: usize, const K: usize>(path: &[ExpansionOver]) -> [Taylor<Interval, K>; NX] {
     from_fn(|i| Taylor { coefficients: from_fn(|k| path[i][k]) })
 }
 
@@ -350,7 +350,7 @@ fn first_over<const NX: usize, const K: usize>(path: &[CourseOver]) -> [Taylor<I
 #[inline(never)]
 pub(super) fn rates_over<P, const NX: usize, const NU: usize, const K: usize>(
     plant: &P,
-    path: &[CourseOver],
+    path: &[ExpansionOver],
     u: &[f64],
     out: &mut [RateOver],
 ) where
@@ -368,7 +368,7 @@ pub(super) fn rates_over<P, const NX: usize, const NU: usize, const K: usize>(
 
 /// `barrier` on enclosures of time and of the expansions of the states. Once for a barrier.
 #[inline(never)]
-pub(super) fn value_over<B, const NX: usize>(barrier: &B, time: Interval, path: &[CourseOver]) -> Interval
+pub(super) fn value_over<B, const NX: usize>(barrier: &B, time: Interval, path: &[ExpansionOver]) -> Interval
 where
     B: Barrier<NX>,
 {
@@ -377,20 +377,20 @@ where
 
 /// The last coefficient of the expansion of `barrier` on enclosures of time and of those of the states. Once for a barrier.
 #[inline(never)]
-pub(super) fn last_over<B, const NX: usize>(barrier: &B, time: Interval, path: &[CourseOver]) -> Interval
+pub(super) fn last_over<B, const NX: usize>(barrier: &B, time: Interval, path: &[ExpansionOver]) -> Interval
 where
     B: Barrier<NX>,
 {
-    let states = first_over::<NX, COURSE>(path);
-    barrier.value(time_over(time), &states).coefficients[COURSE - 1]
+    let states = first_over::<NX, EXPANSION_ORDERS>(path);
+    barrier.value(time_over(time), &states).coefficients[EXPANSION_ORDERS - 1]
 }
 
 /// Time from anywhere in `time` on.
 #[inline(always)]
 fn time_over<const K: usize>(time: Interval) -> Taylor<Interval, K> {
-    let mut course = Taylor::time(0.0);
-    course.coefficients[0] = time;
-    course
+    let mut expansion = Taylor::time(0.0);
+    expansion.coefficients[0] = time;
+    expansion
 }
 
 /// A number that h does not fall below until `dt` s after `t` and `x` under the held input `u`: sharper where it would be less
@@ -425,8 +425,8 @@ where
     if low >= wanted {
         return low;
     }
-    let course = from_fn::<_, NX, _>(|i| Taylor { coefficients: states[i] });
-    let slope = barrier.value(time_over::<2>(time), &course).coefficients[1];
+    let expansion = from_fn::<_, NX, _>(|i| Taylor { coefficients: states[i] });
+    let slope = barrier.value(time_over::<2>(time), &expansion).coefficients[1];
     enclosure::sharper(low, barrier.value(t, &x), slope, dt)
 }
 

@@ -4,8 +4,8 @@ use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use super::{
-    Ahead, COURSE, Course, CourseOver, DerivativeSource, Derivatives, Direction, Directional, Predict,
-    PredictDirectional, RateOver,
+    Ahead, DerivativeSource, Derivatives, Direction, Directional, EXPANSION_ORDERS, Expansion, ExpansionOver,
+    Predict, PredictDirectional, RateOver,
 };
 use crate::MAX_RELATIVE_DEGREE;
 use crate::error::{Error, ErrorKind, length};
@@ -31,8 +31,8 @@ impl Embedded {
     }
 
     /// The same of enclosures, and nothing known after them.
-    fn picked_over(&self, path: &[CourseOver]) -> [CourseOver; MAX_PICKED] {
-        let mut own = [[Interval::ALL; COURSE]; MAX_PICKED];
+    fn picked_over(&self, path: &[ExpansionOver]) -> [ExpansionOver; MAX_PICKED] {
+        let mut own = [[Interval::ALL; EXPANSION_ORDERS]; MAX_PICKED];
         for (own, &pick) in own.iter_mut().zip(&self.picks) {
             *own = path[pick];
         }
@@ -131,12 +131,12 @@ impl Predict for Embedded {
         self.put_back(&own, out);
     }
 
-    fn path(&self, x: &[f64], u: &[f64], out: &mut [Course]) {
+    fn path(&self, x: &[f64], u: &[f64], out: &mut [Expansion]) {
         let Some(source) = self.source.predict() else { return };
-        let mut own = [[0.0; COURSE]; MAX_PICKED];
+        let mut own = [[0.0; EXPANSION_ORDERS]; MAX_PICKED];
         source.path(&self.picked(x)[..self.picks.len()], u, &mut own[..self.picks.len()]);
         for (out, &x) in out.iter_mut().zip(x) {
-            *out = [0.0; COURSE];
+            *out = [0.0; EXPANSION_ORDERS];
             out[0] = x;
         }
         for (&pick, own) in self.picks.iter().zip(own) {
@@ -144,23 +144,23 @@ impl Predict for Embedded {
         }
     }
 
-    fn rates_over(&self, path: &[CourseOver], u: &[f64], orders: usize, out: &mut [RateOver]) -> bool {
+    fn rates_over(&self, path: &[ExpansionOver], u: &[f64], orders: usize, out: &mut [RateOver]) -> bool {
         let Some(source) = self.source.predict() else { return false };
-        let mut own = [[Interval::ALL; COURSE - 1]; MAX_PICKED];
+        let mut own = [[Interval::ALL; EXPANSION_ORDERS - 1]; MAX_PICKED];
         let n = self.picks.len();
         let known = source.rates_over(&self.picked_over(path)[..n], u, orders, &mut own[..n]);
-        out.fill([Interval::from(0.0); COURSE - 1]);
+        out.fill([Interval::from(0.0); EXPANSION_ORDERS - 1]);
         for (&pick, own) in self.picks.iter().zip(own) {
             out[pick] = own;
         }
         known
     }
 
-    fn value_over(&self, time: Interval, path: &[CourseOver]) -> Option<Interval> {
+    fn value_over(&self, time: Interval, path: &[ExpansionOver]) -> Option<Interval> {
         self.source.predict()?.value_over(time, &self.picked_over(path)[..self.picks.len()])
     }
 
-    fn last_over(&self, time: Interval, path: &[CourseOver]) -> Option<Interval> {
+    fn last_over(&self, time: Interval, path: &[ExpansionOver]) -> Option<Interval> {
         self.source.predict()?.last_over(time, &self.picked_over(path)[..self.picks.len()])
     }
 
@@ -182,9 +182,9 @@ impl Predict for Embedded {
         source.value(t, &self.picked(x)[..self.picks.len()])
     }
 
-    fn value_along(&self, t: f64, path: &[Course], out: &mut Course) {
+    fn value_along(&self, t: f64, path: &[Expansion], out: &mut Expansion) {
         let Some(source) = self.source.predict() else { return };
-        let mut own = [[0.0; COURSE]; MAX_PICKED];
+        let mut own = [[0.0; EXPANSION_ORDERS]; MAX_PICKED];
         for (own, &pick) in own.iter_mut().zip(&self.picks) {
             *own = path[pick];
         }

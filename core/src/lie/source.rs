@@ -104,30 +104,30 @@ pub trait Predict {
     fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]);
 
     /// Writes the expansion of every state from `x` on under the held input `u`.
-    fn path(&self, x: &[f64], u: &[f64], out: &mut [Course]);
+    fn path(&self, x: &[f64], u: &[f64], out: &mut [Expansion]);
 
     /// h at time `t` (s) and state `x`.
     fn value(&self, t: f64, x: &[f64]) -> f64;
 
     /// Writes the expansion of h along `path`, the expansions of all states from `t` on.
-    fn value_along(&self, t: f64, path: &[Course], out: &mut Course);
+    fn value_along(&self, t: f64, path: &[Expansion], out: &mut Expansion);
 
-    /// Writes enclosures of the first `orders` coefficients, 1 to [`COURSE`] − 1, of ẋ under `u`: as a series in time that
+    /// Writes enclosures of the first `orders` coefficients, 1 to [`EXPANSION_ORDERS`] − 1, of ẋ under `u`: as a series in time that
     /// begins anywhere on a stretch of a path, by those of the expansions of all states that begin there. Says whether it
     /// did: the default has none, and then what curves the plant's motion between the instants at which it is looked at is
     /// not seen.
-    fn rates_over(&self, _path: &[CourseOver], _u: &[f64], _orders: usize, _out: &mut [RateOver]) -> bool {
+    fn rates_over(&self, _path: &[ExpansionOver], _u: &[f64], _orders: usize, _out: &mut [RateOver]) -> bool {
         false
     }
 
     /// An enclosure of h on such a stretch, at those of the time (s). The default has none: then what curves h between the
     /// instants at which it is looked at is not seen.
-    fn value_over(&self, _time: Interval, _path: &[CourseOver]) -> Option<Interval> {
+    fn value_over(&self, _time: Interval, _path: &[ExpansionOver]) -> Option<Interval> {
         None
     }
 
     /// The same for the last coefficient of the expansion of h that begins anywhere on that stretch.
-    fn last_over(&self, _time: Interval, _path: &[CourseOver]) -> Option<Interval> {
+    fn last_over(&self, _time: Interval, _path: &[ExpansionOver]) -> Option<Interval> {
         None
     }
 
@@ -177,19 +177,19 @@ pub trait SharedPlant {
 }
 
 /// A quantity over time from an instant on: its first Taylor coefficients there, of τ⁰, τ¹ …
-pub type Course = [f64; COURSE];
+pub type Expansion = [f64; EXPANSION_ORDERS];
 
-/// What the coefficients of a [`Course`] are within, wherever on a stretch of time it begins.
-pub type CourseOver = [Interval; COURSE];
+/// What the coefficients of an [`Expansion`] are within, wherever on a stretch of time it begins.
+pub type ExpansionOver = [Interval; EXPANSION_ORDERS];
 
 /// The same for its rate, which has one coefficient less.
-pub type RateOver = [Interval; COURSE - 1];
+pub type RateOver = [Interval; EXPANSION_ORDERS - 1];
 
 /// Coefficients of a rate that do for most of the way of a plan, at a fifth of the cost of all.
 pub(crate) const FEW_ORDERS: usize = 4;
 
-/// Number of coefficients of a [`Course`]. With ten a vehicle that turns by half a radian is resolved to 1e-9.
-pub const COURSE: usize = 10;
+/// Number of coefficients of an [`Expansion`]. With ten a vehicle that turns by half a radian is resolved to 1e-9.
+pub const EXPANSION_ORDERS: usize = 10;
 
 /// The derivatives of h at an instant, differentiated along a direction.
 pub trait Directional {

@@ -3,7 +3,7 @@
 use alloc::string::{String, ToString};
 use core::fmt;
 
-/// What keeps a list of inputs from being a witness.
+/// What keeps a list of inputs from being a backup plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -19,7 +19,7 @@ pub enum Failure {
         #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
         slack: f64,
     },
-    /// The plant does not come to rest, or a set moves.
+    /// The plant does not reach an equilibrium, or a set moves.
     NoRest,
     /// A deviation that nobody could measure grows on the way until the plan is lost.
     Unsteady,

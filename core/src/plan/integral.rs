@@ -1,7 +1,7 @@
 //! Plans behind an integrator: the plant is given the mean of an integral over each period.
 
 use crate::interval::Interval;
-use crate::lie::{Ahead, COURSE, Course, CourseOver, Predict, RateOver};
+use crate::lie::{Ahead, EXPANSION_ORDERS, Expansion, ExpansionOver, Predict, RateOver};
 
 /// A state that is the integral of an input, and of which the plant is given the mean over each period, held.
 #[derive(Clone, Copy, Debug)]
@@ -33,7 +33,7 @@ impl Predict for Limit<'_> {
         self.plant.rate(x, u, out);
     }
 
-    fn path(&self, x: &[f64], u: &[f64], out: &mut [Course]) {
+    fn path(&self, x: &[f64], u: &[f64], out: &mut [Expansion]) {
         self.plant.path(x, u, out);
     }
 
@@ -41,16 +41,16 @@ impl Predict for Limit<'_> {
         self.sign * (x[self.state] - self.limit)
     }
 
-    fn value_along(&self, _: f64, path: &[Course], out: &mut Course) {
+    fn value_along(&self, _: f64, path: &[Expansion], out: &mut Expansion) {
         *out = path[self.state].map(|c| self.sign * c);
         out[0] -= self.sign * self.limit;
     }
 
-    fn rates_over(&self, path: &[CourseOver], u: &[f64], orders: usize, out: &mut [RateOver]) -> bool {
+    fn rates_over(&self, path: &[ExpansionOver], u: &[f64], orders: usize, out: &mut [RateOver]) -> bool {
         self.plant.rates_over(path, u, orders, out)
     }
 
-    fn value_over(&self, _: Interval, path: &[CourseOver]) -> Option<Interval> {
+    fn value_over(&self, _: Interval, path: &[ExpansionOver]) -> Option<Interval> {
         Some((path[self.state][0] - self.limit) * self.sign)
     }
 
@@ -58,7 +58,7 @@ impl Predict for Limit<'_> {
         Some(true)
     }
 
-    fn last_over(&self, _: Interval, path: &[CourseOver]) -> Option<Interval> {
-        Some(path[self.state][COURSE - 1] * self.sign)
+    fn last_over(&self, _: Interval, path: &[ExpansionOver]) -> Option<Interval> {
+        Some(path[self.state][EXPANSION_ORDERS - 1] * self.sign)
     }
 }

@@ -15,45 +15,47 @@ const RICCATI: u32 = 2000;
 
 /// u = `input` + `gain` (x − `state`), moved into the bounds: stops the plant, wherever that is.
 ///
-/// The gain is that of the linear-quadratic regulator at the rest, with the price ‖ẋ‖². So it asks for no place, only
+/// The gain is that of the linear-quadratic regulator at the equilibrium, with the price ‖ẋ‖². So it asks for no place, only
 /// that nothing moves: a vehicle is braked where it is, a pendulum is held upright.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(super) struct Brake {
+pub(super) struct StoppingController {
     pub(super) state: Vec<f64>,
     pub(super) input: Vec<f64>,
     pub(super) gain: Gain,
     /// The length of a hold in s.
     pub(super) hold: f64,
-    /// How many times a deviation from the rest grows over a hold under `input` alone: the largest eigenvalue.
+    /// How many times a deviation from the equilibrium grows over a hold under `input` alone: the largest eigenvalue.
     growth: f64,
 }
 
-/// Largest eigenvalue over a hold of a rest that stays: round-off of a multiple one.
+/// Largest eigenvalue over a hold of an equilibrium that stays: round-off of a multiple one.
 const STAYS: f64 = 1.0 + 1e-4;
-/// Least part of a deviation that moves over a hold, against the largest, beside a rest that has no other beside it.
+/// Least part of a deviation that moves over a hold, against the largest, beside an equilibrium that has no other beside it.
 const SOLE: f64 = 1e-6;
-/// Growth of a deviation from a rest over the longest hold that holds it there.
+/// Growth of a deviation from an equilibrium over the longest hold that holds it there.
 const LOST: f64 = 1.35;
-/// How fast a rest that does not stay is come to, against how fast it is lost.
+/// How fast an equilibrium that does not stay is come to, against how fast it is lost.
 const HASTE: f64 = 0.6;
 /// Largest part of a state by which another one moves over a hold that is round-off of a difference.
 const STILL: f64 = 1e-8;
 
-impl Brake {
-    /// The law around the rest near `x`, with inputs held for `hold` s. `None` where no rest or no law is found.
+impl StoppingController {
+    /// The law around the equilibrium near `x`, with inputs held for `hold` s. `None` where no equilibrium or no law is
+    /// found.
     pub(super) fn around(model: &Model<'_>, x: &[f64], hold: f64) -> Option<Self> {
-        let (state, input) = model.rest(x)?;
+        let (state, input) = model.equilibrium(x)?;
         Self::at(model, state, input, hold)
     }
 
-    /// The law around the rest near `x` and the input `u`, as [`Self::around`].
+    /// The law around the equilibrium near `x` and the input `u`, as [`Self::around`].
     pub(super) fn beside(model: &Model<'_>, x: &[f64], u: &[f64], hold: f64) -> Option<Self> {
-        let (state, input) = model.rest_from(x, u.to_vec())?;
+        let (state, input) = model.equilibrium_from(x, u.to_vec())?;
         Self::at(model, state, input, hold)
     }
 
-    /// The law that leads from `x` to the rest at `state` under `input`: it asks for the place too, as a reference does.
+    /// The law that leads from `x` to the equilibrium at `state` under `input`: it asks for the place too, as a reference
+    /// does.
     pub(super) fn to(
         model: &Model<'_>,
         x: &[f64],
@@ -66,7 +68,7 @@ impl Brake {
         growth.is_finite().then_some(Self { state, input, gain: Gain::from(&gain), hold, growth })
     }
 
-    /// The same law with shorter holds where the rest is lost sooner; they are so many times `period`.
+    /// The same law with shorter holds where the equilibrium is lost sooner; they are so many times `period`.
     pub(super) fn shorter(&self, model: &Model<'_>, period: f64) -> Option<Self> {
         let hold = (self.longest(LOST) / period) as u32;
         let hold = f64::from(hold.max(1)) * period;
@@ -76,12 +78,12 @@ impl Brake {
         }
     }
 
-    /// Whether the rest stays where it is under `input` alone: no eigenvalue leads away.
+    /// Whether the equilibrium stays where it is under `input` alone: no eigenvalue leads away.
     pub(super) fn stays(&self) -> bool {
         self.growth <= STAYS
     }
 
-    /// Whether the plant rests at other places beside this one under the same input, as a vehicle does, and a motor not.
+    /// Whether the plant has other equilibria beside this one under the same input, as a vehicle does, and a motor not.
     pub(super) fn is_one_of_many(&self, model: &Model<'_>) -> bool {
         let Linear { a, .. } = model.linear(&self.state, &self.input, self.hold);
         let moved = &a - DMatrix::identity(a.nrows(), a.ncols());
@@ -89,7 +91,7 @@ impl Brake {
         sizes.min() <= SOLE * sizes.max()
     }
 
-    /// The time in s in which a deviation from the rest grows so many times; at most a hold.
+    /// The time in s in which a deviation from the equilibrium grows so many times; at most a hold.
     pub(super) fn longest(&self, growth: f64) -> f64 {
         self.hold * (elementary::ln(growth) / elementary::ln(self.growth.max(growth)))
     }
@@ -107,7 +109,8 @@ impl Brake {
         let q = rate.transpose() * rate;
         let gained = b.transpose() * &q * &b;
         // An input that moves nothing at once, such as one behind an integrator, is priced like the others.
-        // Where every state is a rest, as of a point moved by its velocity, nothing is gained, and nothing is braked.
+        // Where every state is an equilibrium, as of a point moved by its velocity, nothing is gained, and nothing is
+        // braked.
         let reach = b.column_iter().fold(0.0, |m: f64, column| m.max(column.norm_squared()));
         let most = gained.diagonal().max().max(1e-12 * reach / square(hold)).max(f64::MIN_POSITIVE);
         let r = DMatrix::from_diagonal(&gained.diagonal().map(|g| GENTLENESS * g.max(1e-3 * most)));
@@ -208,7 +211,7 @@ impl Reference {
         ends.iter().position(|end| *end > t + slack)
     }
 
-    /// Writes the input for the rest of hold `k`, at time `t` and `x`.
+    /// Writes the input for the remainder of hold `k`, at time `t` and `x`.
     pub(super) fn input(&self, model: &Model<'_>, k: usize, t: f64, x: &[f64], u: &mut [f64]) {
         let (begin, end) = (self.times[k], self.times[k + 1]);
         let mut at = self.states[k].clone();

@@ -13,8 +13,8 @@ use crate::qp::Bounds;
 
 /// Part of a state's size by which it is moved to differentiate.
 const DIFFERENCE: f64 = 1e-6;
-/// Most Gauss-Newton steps to a state of rest.
-const TO_REST: u32 = 30;
+/// Most Gauss-Newton steps to an equilibrium.
+const TO_EQUILIBRIUM: u32 = 30;
 /// Most steps of an eigenvalue decomposition: it takes a few for each state.
 const MOST_ROTATIONS: usize = 1000;
 /// Least singular value that counts, as a part of the largest.
@@ -93,25 +93,25 @@ impl Model<'_> {
 
     /// A state near `x` and an input within the bounds that holds it there for a step: least change by Gauss-Newton steps.
     /// `None` where none is found.
-    pub(super) fn rest(&self, x: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
+    pub(super) fn equilibrium(&self, x: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
         let mut u = vec![0.0; self.inputs()];
         self.clamp(&mut u);
-        self.rest_from(x, u).or_else(|| {
+        self.equilibrium_from(x, u).or_else(|| {
             // Without an input a tank may run empty meanwhile.
             let middle = |i: usize| (self.bounds.min[i] + self.bounds.max[i]) / 2.0;
             let middle = (0..self.inputs()).map(middle).map(|u| if u.is_finite() { u } else { 0.0 });
-            self.rest_from(x, middle.collect())
+            self.equilibrium_from(x, middle.collect())
         })
     }
 
-    /// That rest, sought from the input `u` on.
-    pub(super) fn rest_from(&self, x: &[f64], u: Vec<f64>) -> Option<(Vec<f64>, Vec<f64>)> {
-        self.rest_within(x, u, |_, _| {})
+    /// That equilibrium, sought from the input `u` on.
+    pub(super) fn equilibrium_from(&self, x: &[f64], u: Vec<f64>) -> Option<(Vec<f64>, Vec<f64>)> {
+        self.equilibrium_within(x, u, |_, _| {})
     }
 
     /// The same within sets: `missing` tells at a state of each set that it is outside of how much h lacks there, > 0, over
     /// the length of its gradient, and that gradient over its length.
-    pub(super) fn rest_within(
+    pub(super) fn equilibrium_within(
         &self,
         x: &[f64],
         mut u: Vec<f64>,
@@ -119,7 +119,7 @@ impl Model<'_> {
     ) -> Option<(Vec<f64>, Vec<f64>)> {
         let (nx, nu) = (self.states(), self.inputs());
         let (mut at, mut outside, duration) = (x.to_vec(), Vec::new(), self.step);
-        for _ in 0..TO_REST {
+        for _ in 0..TO_EQUILIBRIUM {
             let rate = self.rate(&at, &u, duration);
             if !rate.iter().all(|r| r.is_finite()) {
                 return None;
@@ -143,7 +143,7 @@ impl Model<'_> {
             if !jacobian.iter().all(|v| v.is_finite()) {
                 return None;
             }
-            // An input that its bounds stop leaves the rest of the way to the state.
+            // An input that its bounds stop leaves the remainder of the way to the state.
             let mut stopped = vec![false; nu];
             let step = loop {
                 let svd = jacobian.clone().svd(true, true);

@@ -7,20 +7,20 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::check::{Grid, Walk};
-use super::law::{Brake, Gain, Reference};
+use super::law::{Gain, Reference, StoppingController};
 use super::model::{Model, slopes};
 use super::search::{Descent, Search, Trajectory};
-use super::{Failure, Integral, Plan, Policy, Requirement, Witness};
+use super::{BackupPlan, Failure, Integral, Plan, Policy, Requirement};
 use crate::lie::Predict;
 use crate::qp::Bounds;
 use crate::{MAX_INPUTS, elementary};
 
-pub(crate) use renewal::Sought;
+pub(crate) use renewal::SearchProgress;
 
 /// Grids: the part of the time until each deadline after which its set is already asked for in the search, and the number of
 /// holds until the last deadline and after it. First for a plant that stops soon, then for one that does not, then for
 /// deadlines that leave much time, where long holds are too coarse. Last, where there is a deadline, for one that takes many
-/// times as long as that to come to rest.
+/// times as long as that to reach an equilibrium.
 const GRIDS: [(f64, [usize; 2]); 3] = [(1.0, [32, 12]), (1.0, [16, 28]), (0.35, [32, 12])];
 const SLOW: (f64, [usize; 2]) = (1.0, [4, 40]);
 /// The periods of a hold where there is no deadline; and then, since how long a plant takes to stop has nothing to do with the
@@ -29,7 +29,7 @@ const UNDATED: usize = 5;
 const LONGER: [usize; 2] = [40, 320];
 /// The number of guesses that go on, the nearest ones, and the quadratic programs for each of them.
 const ROUNDS: [(usize, u32); 3] = [(12, 2), (5, 6), (3, 12)];
-/// The same for guesses that lead to a rest within the sets: mostly one of them is a plan as it is.
+/// The same for guesses that lead to an equilibrium within the sets: mostly one of them is a plan as it is.
 const AIMED: &[(usize, u32)] = &[(2, 2), (2, 6)];
 /// The same for guesses beside a plan that was found.
 const BESIDE_GRIDS: usize = 2;
@@ -38,7 +38,7 @@ const BESIDE: &[(usize, u32)] = &[(3, 4), (2, 20)];
 const WORTH: f64 = 0.01;
 /// Margins in the search, in units of those of the check, so that its answer passes.
 const SEARCHED: f64 = 3.0;
-/// Margins for the rest of a plan that was checked before: the model differs from the plant by round-off at least.
+/// Margins for the remainder of a plan that was checked before: the model differs from the plant by round-off at least.
 const KEPT: f64 = 0.5;
 /// Margins for another input where the next sample may come at any time: what is left is for the plan to move by.
 const WARY: f64 = 4.0;
@@ -46,7 +46,7 @@ const WARY: f64 = 4.0;
 const NEARLY: f64 = -100.0;
 /// Margin of a limit of an integral in the search, as a part of the way to it at the start.
 const ROOM: f64 = 1e-3;
-/// The most pieces of a walk between samples, if it is more so many times those of the plan at hand.
+/// The most pieces of a walk between samples, if it is more so many times those of the current plan.
 const HURRIED: [u32; 2] = [1000, 4];
 /// Checks of a trajectory, each after the first with more margin; those on end that may miss hardly less than the one before, which
 /// is this part of it; and the quadratic programs between them.
@@ -74,25 +74,25 @@ const ASKED: f64 = 16.0;
 const GUESSES: [[f64; 2]; 4] = [[0.4, 0.35], [0.6, 0.1], [0.5, 0.0], [1.0, 0.6]];
 /// What is gone for, of how deep inside a set it has to be: round-off is not missing then.
 const BEYOND: f64 = 1.5;
-/// How many times as deep inside the sets a rest is sought as the one before, and how often.
+/// How many times as deep inside the sets an equilibrium is sought as the one before, and how often.
 const DEEPER: (f64, usize) = (4.0, 10);
-/// How far a plan without a rest is sought, in units of how far it has to reach: the next search is that much later.
+/// How far a plan without an equilibrium is sought, in units of how far it has to reach: the next search is that much later.
 const AMPLE: f64 = 1.5;
 
-/// What a first guess does where nothing else is wanted: the plant is stopped, or where there is no rest the input nearest
-/// to 0 is held.
-struct Guide(Option<Brake>);
+/// What a first guess does where nothing else is wanted: the plant is stopped, or where there is no equilibrium the input
+/// nearest to 0 is held.
+struct Guide(Option<StoppingController>);
 
 impl Guide {
     fn stays(&self) -> bool {
-        self.0.as_ref().is_none_or(Brake::stays)
+        self.0.as_ref().is_none_or(StoppingController::stays)
     }
 
-    /// The input of the rest.
-    fn rest(&self, model: &Model<'_>) -> Vec<f64> {
+    /// The input of the equilibrium.
+    fn equilibrium_input(&self, model: &Model<'_>) -> Vec<f64> {
         let mut u = vec![0.0; model.inputs()];
         match &self.0 {
-            Some(brake) => u.copy_from_slice(&brake.input),
+            Some(stopping) => u.copy_from_slice(&stopping.input),
             None => model.clamp(&mut u),
         }
         u
@@ -101,28 +101,28 @@ impl Guide {
     /// Writes the input at `x`.
     fn input(&self, model: &Model<'_>, x: &[f64], u: &mut [f64]) {
         match &self.0 {
-            Some(brake) => brake.input(model, x, u),
-            None => u.copy_from_slice(&self.rest(model)),
+            Some(stopping) => stopping.input(model, x, u),
+            None => u.copy_from_slice(&self.equilibrium_input(model)),
         }
     }
 }
 
-/// How plans come to their end: at rest under a law, where there is one.
+/// How plans come to their end: at an equilibrium under a law, where there is one.
 struct Ending<'a> {
     model: Model<'a>,
     /// The length of a hold of the search in s.
     hold: f64,
-    brake: Option<Arc<Brake>>,
-    /// The law that leads to a rest within the sets.
-    aim: Option<Arc<Brake>>,
+    stopping: Option<Arc<StoppingController>>,
+    /// The law that leads to an equilibrium within the sets.
+    aim: Option<Arc<StoppingController>>,
 }
 
 impl Ending<'_> {
-    /// The law around the rest at the end of `found`, for samples that are `period` s apart.
-    fn at_end(&self, found: &Trajectory, period: f64) -> Option<Arc<Brake>> {
-        self.brake.as_ref()?;
+    /// The law around the equilibrium at the end of `found`, for samples that are `period` s apart.
+    fn at_end(&self, found: &Trajectory, period: f64) -> Option<Arc<StoppingController>> {
+        self.stopping.as_ref()?;
         let (x, u) = (found.states.last()?, found.inputs.last()?);
-        Brake::beside(&self.model, x, u, self.hold)?.shorter(&self.model, period).map(Arc::new)
+        StoppingController::beside(&self.model, x, u, self.hold)?.shorter(&self.model, period).map(Arc::new)
     }
 }
 
@@ -140,15 +140,15 @@ pub(crate) struct Planner<'a> {
     size: f64,
     /// Whether samples come as those before did.
     regular: bool,
-    /// Whether a trial may not take much longer than the plan at hand, and the quadratic programs of a search that goes on at the
-    /// next sample.
+    /// Whether a trial may not take much longer than the current plan, and the quadratic programs of a search that goes on
+    /// at the next sample.
     hurried: bool,
     programs: u32,
     integral: Option<Integral>,
     policies: &'a [Policy],
-    /// How long in s a plan has to be without a rest at its end, where it may be; and a plan that one goes on from.
+    /// How long in s a plan has to be without an equilibrium at its end, where it may be; and a plan that one goes on from.
     horizon: Option<f64>,
-    before: Option<&'a Witness>,
+    before: Option<&'a BackupPlan>,
     /// A plan for other deadlines with which alone a search begins, and how many times as long these are.
     beside: Option<(&'a Plan, f64)>,
 }
@@ -189,8 +189,8 @@ impl<'a> Planner<'a> {
         Self { regular: !irregular, ..self }
     }
 
-    /// The same planner between samples: a walk behind another input is given up where it takes many more pieces than the plan at
-    /// hand, and a search goes on at the next sample after so many quadratic programs.
+    /// The same planner between samples: a walk behind another input is given up where it takes many more pieces than the
+    /// current plan, and a search goes on at the next sample after so many quadratic programs.
     #[must_use]
     pub(crate) fn hurried(self, programs: u32) -> Self {
         Self { hurried: true, programs, ..self }
@@ -215,8 +215,8 @@ impl<'a> Planner<'a> {
         Self { policies, ..self }
     }
 
-    /// The same planner, whose plans need not end at rest where they reach so many seconds, finite, > 0, past the last
-    /// deadline and the sample.
+    /// The same planner, whose plans need not end at an equilibrium where they reach so many seconds, finite, > 0, past the
+    /// last deadline and the sample.
     #[must_use]
     pub(crate) fn until(self, horizon: Option<f64>) -> Self {
         Self { horizon, ..self }
@@ -224,7 +224,7 @@ impl<'a> Planner<'a> {
 
     /// The same planner for plans that reach no less far than `before`, with which a search begins.
     #[must_use]
-    pub(crate) fn beyond(self, before: &'a Witness) -> Self {
+    pub(crate) fn beyond(self, before: &'a BackupPlan) -> Self {
         Self { before: Some(before), ..self }
     }
 
@@ -260,12 +260,12 @@ impl<'a> Planner<'a> {
         match (self.horizon, self.before.map(|before| before.until.is_finite())) {
             (None, _) | (_, Some(false)) => to(None),
             (Some(_), None) => to(None).or_else(|_| to(self.horizon)),
-            // What went on without a rest most likely does so again.
+            // What went on without an equilibrium most likely does so again.
             (Some(_), Some(true)) => to(self.horizon).or_else(|failure| to(None).map_err(|_| failure)),
         }
     }
 
-    /// Searches for a plan that ends at rest, or at a horizon.
+    /// Searches for a plan that ends at an equilibrium, or at a horizon.
     fn search_to(&self, horizon: Option<f64>, t: f64, x: &[f64]) -> Result<Plan, Failure> {
         // What the nearest trial fails at says more than another's, or than that another grid has no trials.
         let (mut failure, mut nearest) = (None, f64::INFINITY);
@@ -293,7 +293,7 @@ impl<'a> Planner<'a> {
                 continue;
             };
             let (sketch, model) = (self.model(coarse), self.model(fine));
-            let mut guide = Brake::around(&model, x, hold);
+            let mut guide = StoppingController::around(&model, x, hold);
             // What is lost within a hold is led in shorter ones.
             let finer =
                 guide.as_ref().map_or(1, |guide| (hold / guide.longest(LED) * (1.0 - 1e-9)) as usize + 1);
@@ -303,17 +303,17 @@ impl<'a> Planner<'a> {
                 && let Some(grid) = self.grid(t, &requirements, holds, horizon)
             {
                 (hold, times) = grid;
-                guide = Brake::around(&model, x, hold).or(guide);
+                guide = StoppingController::around(&model, x, hold).or(guide);
             }
             let mut guide = Guide(guide);
             let aim = self.aim(&sketch, &requirements, &guide, (times[times.len() - 1], hold), x);
             guide.0 = guide.0.or_else(|| aim.clone());
-            let law = |at: &Option<Brake>| {
+            let law = |at: &Option<StoppingController>| {
                 let shorter = at.as_ref().filter(|_| horizon.is_none())?.shorter(&model, self.period);
                 shorter.map(Arc::new)
             };
-            let ending = Ending { model, hold, brake: law(&guide.0), aim: law(&aim) };
-            if horizon.is_none() && ending.brake.is_none() {
+            let ending = Ending { model, hold, stopping: law(&guide.0), aim: law(&aim) };
+            if horizon.is_none() && ending.stopping.is_none() {
                 failure.get_or_insert(Failure::NoRest);
                 continue;
             }
@@ -324,7 +324,7 @@ impl<'a> Planner<'a> {
                 times: &times,
                 x,
                 size: self.size,
-                rests: horizon.is_none(),
+                at_equilibrium: horizon.is_none(),
                 quick: false,
                 sizes: vec![0.0; self.requirements.len()],
             };
@@ -332,7 +332,7 @@ impl<'a> Planner<'a> {
             if let Some(before) = self.before.filter(|_| horizon.is_some()) {
                 let held = |hold: &[f64]| before.mean(hold[0], hold[1])[..self.dims[1]].to_vec();
                 let mut inputs: Vec<Vec<f64>> = times.windows(2).map(held).collect();
-                inputs.push(guide.rest(&sketch));
+                inputs.push(guide.equilibrium_input(&sketch));
                 if let Ok(plan) = self.descend(&search, vec![begin(inputs)], &ROUNDS, &ending) {
                     return Ok(plan);
                 }
@@ -348,9 +348,9 @@ impl<'a> Planner<'a> {
                 let aimed = aim.iter().flat_map(|aim| self.aimed(&sketch, aim, x, &times));
                 self.descend(&search, aimed.map(begin).collect(), AIMED, &ending)
             };
-            // What rests at few places is led to one of them at once, if the user knows no other way.
+            // A plant with isolated equilibria is led to one of them at once, unless there is a policy.
             let leads_first = self.policies.is_empty()
-                && guide.0.as_ref().is_some_and(|rest| !rest.is_one_of_many(&sketch));
+                && guide.0.as_ref().is_some_and(|equilibrium| !equilibrium.is_one_of_many(&sketch));
             if leads_first && let Ok(plan) = lead() {
                 return Ok(plan);
             }
@@ -510,21 +510,21 @@ impl<'a> Planner<'a> {
         let reference = Reference { times: times.to_vec(), inputs, states, gains };
         let mut plan = Plan {
             reference: Some(Arc::new(reference)),
-            brake: ending.brake.clone(),
-            witness: Witness::default(),
+            stopping: ending.stopping.clone(),
+            backup_plan: BackupPlan::default(),
         };
         let grid = Grid { period: self.period, even: true };
         let walk = |plan: &Plan| self.walk(plan, 1.0, grid, (times[0], &found.states[0]), None, true);
         let failure = match walk(&plan) {
-            Ok(witness) => return Ok(Plan { witness, ..plan }),
+            Ok(backup_plan) => return Ok(Plan { backup_plan, ..plan }),
             Err(failure) => failure,
         };
-        // Where not every place is a rest, the law leads back to the one that it is around.
+        // Where not every position is an equilibrium, the law leads back to the one that it is around.
         if !matches!(failure, Failure::Broken { time, .. } if time < times[times.len() - 1]) {
             for law in [ending.at_end(found, self.period), ending.aim.clone()].into_iter().flatten() {
-                plan.brake = Some(law);
-                if let Ok(witness) = walk(&plan) {
-                    return Ok(Plan { witness, ..plan });
+                plan.stopping = Some(law);
+                if let Ok(backup_plan) = walk(&plan) {
+                    return Ok(Plan { backup_plan, ..plan });
                 }
             }
         }
@@ -536,13 +536,13 @@ impl<'a> Planner<'a> {
         self.walk(plan, 1.0, Grid { period: self.period, even: true }, (t, x), None, true).is_ok()
     }
 
-    /// A witness that begins with `u` for one period from `x` at `t`: the reference of `plan` is followed from there, or
+    /// A backup plan that begins with `u` for one period from `x` at `t`: the reference of `plan` is followed from there, or
     /// the plant is stopped.
     ///
     /// # Errors
     ///
     /// What the first of these fails at.
-    pub(crate) fn behind(&self, plan: &Plan, t: f64, x: &[f64], u: &[f64]) -> Result<Witness, Failure> {
+    pub(crate) fn behind(&self, plan: &Plan, t: f64, x: &[f64], u: &[f64]) -> Result<BackupPlan, Failure> {
         self.on_a_grid(|grid| {
             let at = t + self.period;
             let has_reference =
@@ -550,7 +550,7 @@ impl<'a> Planner<'a> {
             let strictness = if self.regular { 1.0 } else { WARY };
             let walk = |follows| self.walk(plan, strictness, grid, (t, x), Some(u), follows);
             match has_reference {
-                // What ends without a rest ends with its reference.
+                // What ends without an equilibrium ends with its reference.
                 true if plan.is_finite() => walk(true),
                 true => walk(true).or_else(|failure| walk(false).map_err(|_| failure)),
                 false => walk(false),
@@ -558,22 +558,23 @@ impl<'a> Planner<'a> {
         })
     }
 
-    /// The end of `walk`, which has followed the reference of `plan` as far as it goes: at rest, or at its horizon.
-    fn conclude(&self, walk: Walk<'a>, plan: &Plan) -> Result<Witness, Failure> {
-        match (&plan.brake, &plan.reference) {
-            (Some(brake), _) => walk.stop(brake),
+    /// The end of `walk`, which has followed the reference of `plan` as far as it goes: at an equilibrium, or at its
+    /// horizon.
+    fn conclude(&self, walk: Walk<'a>, plan: &Plan) -> Result<BackupPlan, Failure> {
+        match (&plan.stopping, &plan.reference) {
+            (Some(stopping), _) => walk.stop(stopping),
             (None, Some(reference)) => walk.end(reference),
             (None, None) => Err(Failure::NoRest),
         }
     }
 
-    /// The rest of the witness that `plan` has, from `x` at `t`: its inputs as they are; or where the plant is not quite
-    /// the model, or forgets no round-off, the feedback that they came from.
+    /// The remainder of the backup plan that `plan` has, from `x` at `t`: its inputs as they are; or where the plant is not
+    /// quite the model, or forgets no round-off, the feedback that they came from.
     ///
     /// # Errors
     ///
     /// What it fails at.
-    pub(crate) fn tail(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<Witness, Failure> {
+    pub(crate) fn tail(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<BackupPlan, Failure> {
         let nu = self.dims[1];
         // As many of its holds as `held`, then the law behind it.
         let replay = |grid: Grid, held: usize, follows: bool| {
@@ -585,13 +586,13 @@ impl<'a> Planner<'a> {
             };
             if !grid.even {
                 at += grid.period;
-                hold(&mut walk, plan.witness.mean(t, at), at)?;
+                hold(&mut walk, plan.backup_plan.mean(t, at), at)?;
             }
-            let left = plan.witness.inputs.iter().filter(|(end, _)| *end > t + grid.slack());
+            let left = plan.backup_plan.inputs.iter().filter(|(end, _)| *end > t + grid.slack());
             for (end, u) in left.take(held) {
                 if *end > at + grid.slack() {
                     // Not again what has come to its end, which grows by a hold at every sample.
-                    if plan.brake.as_ref().is_some_and(|brake| walk.may_end(brake)) {
+                    if plan.stopping.as_ref().is_some_and(|stopping| walk.may_end(stopping)) {
                         break;
                     }
                     hold(&mut walk, *u, *end)?;
@@ -666,7 +667,7 @@ impl<'a> Planner<'a> {
         start: (f64, &[f64]),
     ) -> Result<Walk<'a>, Failure> {
         let walk = Walk::new(self.model(self.pace()), self.requirements, strictness, grid, start)?;
-        Ok(walk.after(&plan.witness))
+        Ok(walk.after(&plan.backup_plan))
     }
 
     fn walk(
@@ -677,10 +678,10 @@ impl<'a> Planner<'a> {
         (t, x): (f64, &[f64]),
         first: Option<&[f64]>,
         follows: bool,
-    ) -> Result<Witness, Failure> {
+    ) -> Result<BackupPlan, Failure> {
         let mut walk = self.begin(plan, strictness, grid, (t, x))?;
         if self.hurried && strictness >= 1.0 {
-            walk.most_pieces = HURRIED[0].max(HURRIED[1].saturating_mul(plan.witness.pieces));
+            walk.most_pieces = HURRIED[0].max(HURRIED[1].saturating_mul(plan.backup_plan.pieces));
         }
         if let Some(u) = first {
             walk.hold_until(u, t + self.period)?;
@@ -711,7 +712,7 @@ impl<'a> Planner<'a> {
                 };
                 let (coarse, fine) = (run(step), run(step / 2.0));
                 let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= allowed * (1.0 + b.abs());
-                // Not-a-number is not.
+                // NaN is not.
                 coarse.iter().zip(&fine).all(is_near)
             };
             match [1.0, -1.0].map(is_resolved) {
@@ -758,11 +759,12 @@ impl<'a> Planner<'a> {
             mean
         };
         let mut inputs: Vec<Vec<f64>> = times.windows(2).map(mean).collect();
-        inputs.push(guide.rest(model));
+        inputs.push(guide.equilibrium_input(model));
         inputs
     }
 
-    /// The law that leads from `x` to a rest within every set that is asked for at `end`, as deep inside as one is found.
+    /// The law that leads from `x` to an equilibrium within every set that is asked for at `end`, as deep inside as one is
+    /// found.
     fn aim(
         &self,
         model: &Model<'_>,
@@ -770,12 +772,12 @@ impl<'a> Planner<'a> {
         guide: &Guide,
         (end, hold): (f64, f64),
         x: &[f64],
-    ) -> Option<Brake> {
+    ) -> Option<StoppingController> {
         let within = |x: &[f64], u: &[f64], depth: f64| {
-            model.rest_within(x, u.to_vec(), |x, missing| {
+            model.equilibrium_within(x, u.to_vec(), |x, missing| {
                 for requirement in requirements.iter().filter(|r| r.until > end) {
                     let (wanted, h) = (depth * requirement.margin, requirement.model.value(end, x));
-                    // Not-a-number is missing.
+                    // NaN is missing.
                     if h >= wanted {
                         continue;
                     }
@@ -787,19 +789,25 @@ impl<'a> Planner<'a> {
                 }
             })
         };
-        let near = guide.0.as_ref().and_then(|brake| within(&brake.state, &brake.input, SEARCHED));
-        let mut aim = near.or_else(|| within(x, &guide.rest(model), SEARCHED))?;
+        let near = guide.0.as_ref().and_then(|stopping| within(&stopping.state, &stopping.input, SEARCHED));
+        let mut aim = near.or_else(|| within(x, &guide.equilibrium_input(model), SEARCHED))?;
         let (deeper, times) = DEEPER;
         let depths = core::iter::successors(Some(SEARCHED * deeper), |depth| Some(depth * deeper));
         for depth in depths.take(times) {
             let Some(found) = within(&aim.0, &aim.1, depth) else { break };
             aim = found;
         }
-        Brake::to(model, x, aim, hold)
+        StoppingController::to(model, x, aim, hold)
     }
 
-    /// Guesses that lead to the rest of `aim`: by its law, and by the input that rests there.
-    fn aimed(&self, model: &Model<'_>, aim: &Brake, x: &[f64], times: &[f64]) -> [Vec<Vec<f64>>; 2] {
+    /// Guesses that lead to the equilibrium of `aim`: by its law, and by the input that holds the plant there.
+    fn aimed(
+        &self,
+        model: &Model<'_>,
+        aim: &StoppingController,
+        x: &[f64],
+        times: &[f64],
+    ) -> [Vec<Vec<f64>>; 2] {
         let (mut x, mut u) = (x.to_vec(), vec![0.0; model.inputs()]);
         let led = |hold: &[f64]| {
             aim.input(model, &x, &mut u);
@@ -821,7 +829,7 @@ impl<'a> Planner<'a> {
         guide: &Guide,
         times: &[f64],
     ) -> [Vec<Vec<f64>>; 3] {
-        let (rest, begin) = (guide.rest(model), times[0]);
+        let (equilibrium, begin) = (guide.equilibrium_input(model), times[0]);
         // Without the feedback of its walk, where it has a reference.
         let padded = |u: &Vec<f64>| core::array::from_fn(|i| u.get(i).copied().unwrap_or(0.0));
         let inputs = match &plan.reference {
@@ -829,21 +837,24 @@ impl<'a> Planner<'a> {
                 .iter()
                 .copied()
                 .zip(reference.inputs.iter().map(padded))
-                .chain([(f64::INFINITY, padded(&rest))])
+                .chain([(f64::INFINITY, padded(&equilibrium))])
                 .collect(),
-            None => plan.witness.inputs.clone(),
+            None => plan.backup_plan.inputs.clone(),
         };
-        let plan = Witness { inputs, ..Witness::default() };
+        let plan = BackupPlan { inputs, ..BackupPlan::default() };
         let at = |t: f64| begin + (t - begin) / factor;
         [1.0, factor, factor * factor].map(|smaller| {
             let held = |hold: &[f64]| {
                 let mean = plan.mean(at(hold[0]), at(hold[1]));
-                let mut u: Vec<f64> =
-                    rest.iter().zip(mean).map(|(rest, mean)| rest + (mean - rest) / smaller).collect();
+                let mut u: Vec<f64> = equilibrium
+                    .iter()
+                    .zip(mean)
+                    .map(|(equilibrium, mean)| equilibrium + (mean - equilibrium) / smaller)
+                    .collect();
                 model.clamp(&mut u);
                 u
             };
-            times.windows(2).map(held).chain([rest.clone()]).collect()
+            times.windows(2).map(held).chain([equilibrium.clone()]).collect()
         })
     }
 
@@ -886,7 +897,7 @@ impl<'a> Planner<'a> {
                 {
                     // What would fall is held upright meanwhile.
                     match guide.stays() {
-                        true => u.copy_from_slice(&guide.rest(model)),
+                        true => u.copy_from_slice(&guide.equilibrium_input(model)),
                         false => guide.input(model, &x, &mut u),
                     }
                     for i in 0..nu {
@@ -899,7 +910,7 @@ impl<'a> Planner<'a> {
                 model.flow(&mut x, &u, times[k + 1] - times[k]);
                 inputs.push(u.clone());
             }
-            inputs.push(guide.rest(model));
+            inputs.push(guide.equilibrium_input(model));
             inputs
         };
         let others = sides.len() - 1;

@@ -56,15 +56,15 @@ pub(super) struct Search<'a> {
     pub(super) x: &'a [f64],
     /// The size of each input, where it has no bounds.
     pub(super) size: f64,
-    /// Whether the plant has to rest at the end.
-    pub(super) rests: bool,
+    /// Whether the plant has to be at an equilibrium at the end.
+    pub(super) at_equilibrium: bool,
     /// Whether its programs are solved without refinement: faster, and to fewer digits.
     pub(super) quick: bool,
     /// The size of each requirement, where it is not 0: the largest |h| on the way.
     pub(super) sizes: Vec<f64>,
 }
 
-/// Inputs on the grid, one more for the rest at the end, and where they lead.
+/// Inputs on the grid, one more for the equilibrium at the end, and where they lead.
 #[derive(Clone, Default)]
 pub(super) struct Trajectory {
     pub(super) inputs: Vec<Vec<f64>>,
@@ -143,7 +143,7 @@ impl Search<'_> {
         self.model.reach(i, self.size).max(f64::MIN_POSITIVE)
     }
 
-    /// Runs `inputs` ahead, of which the last is for the rest.
+    /// Runs `inputs` ahead, of which the last is for the equilibrium.
     pub(super) fn run(&self, inputs: Vec<Vec<f64>>) -> Trajectory {
         self.steer(inputs, None)
     }
@@ -209,7 +209,7 @@ impl Search<'_> {
         let mut most = 0.0_f64;
         let missing = of.values.iter().map(|&(i, _, value)| -value / of.sizes[i].max(f64::MIN_POSITIVE));
         let moving = of.rate.iter().zip(&of.rates).map(|(r, scale)| r.abs() / scale - 0.01);
-        for part in missing.chain(moving.filter(|_| self.rests)) {
+        for part in missing.chain(moving.filter(|_| self.at_equilibrium)) {
             violation += part.max(0.0);
             most = most.max(part);
         }
@@ -238,7 +238,7 @@ impl Search<'_> {
                 && let Some(gains) = Gain::along(&self.model, &answer.states, &answer.inputs, along)
             {
                 let led = self.steer(answer.inputs, Some((&answer.states, &gains)));
-                // Not-a-number is no better.
+                // NaN is no better.
                 if led.merit < next.merit {
                     next = led;
                 }
@@ -344,12 +344,12 @@ impl Search<'_> {
         let (nx, nu) = (self.model.states(), self.model.inputs());
         let holds = at.inputs.len() - 1;
         let kept: Vec<usize> = (0..rows.len()).filter(|&row| rows[row]).collect();
-        // Variables: δu_0 … δu_N, δx_1 … δx_N, slacks of the rows, of the rest.
+        // Variables: δu_0 … δu_N, δx_1 … δx_N, slacks of the rows, of the equilibrium.
         let input = |k: usize, i: usize| k * nu + i;
         let state = |k: usize, i: usize| (holds + 1) * nu + (k - 1) * nx + i;
         let first_slack = (holds + 1) * nu + holds * nx;
-        let first_rest = first_slack + kept.len();
-        let variables = first_rest + nx;
+        let first_equilibrium = first_slack + kept.len();
+        let variables = first_equilibrium + nx;
         let (mut is, mut js, mut vs, mut b) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let mut entry = |i: usize, j: usize, v: f64| {
             if v != 0.0 {
@@ -384,12 +384,12 @@ impl Search<'_> {
             entry(b.len(), first_slack + slack, -1.0);
             b.push(value / size);
         }
-        // The rest at the end, if there is to be one.
+        // The equilibrium at the end, if there is to be one.
         let hold = self.hold(holds - 1);
         let Linear { a, b: by } = self.model.linear(&at.states[holds], &at.inputs[holds], hold);
         let a = (a - DMatrix::identity(nx, nx)) / hold;
         let by = by / hold;
-        for i in 0..if self.rests { nx } else { 0 } {
+        for i in 0..if self.at_equilibrium { nx } else { 0 } {
             for sign in [1.0, -1.0] {
                 let scale = sign / at.rates[i];
                 for j in 0..nx {
@@ -398,7 +398,7 @@ impl Search<'_> {
                 for j in 0..nu {
                     entry(b.len(), input(holds, j), scale * by[(i, j)]);
                 }
-                entry(b.len(), first_rest + i, -1.0);
+                entry(b.len(), first_equilibrium + i, -1.0);
                 b.push(-scale * at.rate[i]);
             }
         }

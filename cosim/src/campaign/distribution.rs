@@ -36,7 +36,7 @@ enum DistributionName {
     LogUniform,
     Normal,
     Choice,
-    Course,
+    Sequence,
     Seed,
 }
 
@@ -48,7 +48,7 @@ impl DistributionName {
             Self::LogUniform => ("log_uniform", &["min", "max"], &[]),
             Self::Normal => ("normal", &["mean", "deviation"], &["min", "max"]),
             Self::Choice => ("choice", &["values"], &[]),
-            Self::Course => ("sequence", &["values", "period"], &[]),
+            Self::Sequence => ("sequence", &["values", "period"], &[]),
             Self::Seed => ("seed", &[], &[]),
         }
     }
@@ -85,7 +85,7 @@ pub enum Distribution {
     /// Picks one of these, each as likely as the others.
     Choice(Vec<f64>),
     /// The same in every run: these values one after the other, from the start on; the last one stays.
-    Course {
+    Sequence {
         /// The values, at least one.
         values: Vec<f64>,
         /// Time in s for which each lasts, > 0.
@@ -147,7 +147,7 @@ impl VarySection {
                 Ok(Distribution::LogUniform { min, max })
             }
             DistributionName::Normal => self.normal(field, range),
-            DistributionName::Choice | DistributionName::Course => {
+            DistributionName::Choice | DistributionName::Sequence => {
                 let values = self.values.clone().unwrap_or_default();
                 if values.is_empty() {
                     return Err(wrong("values", "is empty, must have at least one value".to_owned()));
@@ -159,7 +159,7 @@ impl VarySection {
                     None => Ok(Distribution::Choice(values)),
                     Some(period) => {
                         Range::POSITIVE.check(&format!("{field}.period"), period)?;
-                        Ok(Distribution::Course { values, period })
+                        Ok(Distribution::Sequence { values, period })
                     }
                 }
             }
@@ -213,7 +213,7 @@ impl fmt::Display for Distribution {
                 let values: Vec<_> = values.iter().map(ToString::to_string).collect();
                 write!(f, "one of {}", values.join(", "))
             }
-            Self::Course { values, period } => {
+            Self::Sequence { values, period } => {
                 let count = values.len();
                 write!(f, "a sequence of {count} values, each for {period} s, from {:?} on", values[0])
             }
@@ -248,7 +248,7 @@ impl Distribution {
                 (mean + deviation * z).clamp(*min, *max)
             }
             Self::Choice(values) => values[((u * values.len() as f64) as usize).min(values.len() - 1)],
-            Self::Course { values, .. } => values[0],
+            Self::Sequence { values, .. } => values[0],
             Self::Seed => seed as f64,
         }
     }

@@ -15,7 +15,7 @@ use uuid::Uuid;
 use super::distribution::{Distribution, VarySection};
 use super::part::Part;
 use super::sampling::{MAX_RUNS, Sampler, Sampling};
-use crate::coupling::{self, Course, Grid, Simulation, StartValue, System, check_fed, links, port};
+use crate::coupling::{self, Grid, Sequence, Simulation, StartValue, System, check_fed, links, port};
 use crate::error::Error;
 use crate::host::{Causality, DataType, Variability};
 use crate::package;
@@ -343,7 +343,7 @@ impl Campaign {
                 distribution: section.checked(&field, range).map_err(in_file)?,
             });
             let varied = &varied[varied.len() - 1];
-            if let Distribution::Course { period, .. } = varied.distribution {
+            if let Distribution::Sequence { period, .. } = varied.distribution {
                 let wrong =
                     |key, message| Err(in_file(ConfigurationError::new(format!("{field}.{key}"), message)));
                 if !varied.tunable {
@@ -485,7 +485,7 @@ impl Campaign {
         file["campaign"]["runs"] = 1.into();
         for (varied, value) in self.varied.iter().zip(&choice.values) {
             let alone = match (&varied.distribution, self.piece()?) {
-                (Distribution::Course { .. }, _) => continue,
+                (Distribution::Sequence { .. }, _) => continue,
                 (Distribution::Seed, Some(steps)) => serde_json::json!({
                     "distribution": "sequence",
                     "values": choice.pieces,
@@ -527,18 +527,18 @@ impl Campaign {
             simulation.set_start(varied.component, varied.reference, *value);
         }
         let pieces: Vec<f64> = choice.pieces.iter().map(|seed| *seed as f64).collect();
-        let course = |varied: &Varied| {
+        let sequence = |varied: &Varied| {
             let (values, steps) = match &varied.distribution {
-                Distribution::Course { values, period } => {
+                Distribution::Sequence { values, period } => {
                     (values, whole(period / self.system.experiment().step)? as u64)
                 }
                 Distribution::Seed if !pieces.is_empty() => (&pieces, self.piece().ok()??),
                 _ => return None,
             };
             let Varied { component, reference, .. } = *varied;
-            Some(Course { component, reference, steps, values: values.clone() })
+            Some(Sequence { component, reference, steps, values: values.clone() })
         };
-        simulation.set_courses(self.varied.iter().filter_map(course).collect());
+        simulation.set_sequences(self.varied.iter().filter_map(sequence).collect());
     }
 }
 

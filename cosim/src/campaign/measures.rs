@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use punctual_core::filter::{Standing, Status};
+use punctual_core::filter::{AssuranceStatus, Status};
 use punctual_fmu::configuration::Configuration;
 
 use super::file::{Campaign, Choice, Success};
@@ -39,7 +39,7 @@ struct Seen {
     /// Number of steps by status.
     counts: [u64; Status::ALL.len()],
     /// Number of steps by status of its guarantee.
-    standings: [u64; Standing::ALL.len()],
+    assurance_statuses: [u64; AssuranceStatus::ALL.len()],
     /// Largest size by input.
     peaks: Vec<f64>,
 }
@@ -141,7 +141,7 @@ impl Measures {
     fn nothing(&self) -> Vec<Seen> {
         let nothing = |filter: &FilterPlan| Seen {
             counts: [0; Status::ALL.len()],
-            standings: [0; Standing::ALL.len()],
+            assurance_statuses: [0; AssuranceStatus::ALL.len()],
             peaks: vec![0.0; filter.inputs.len()],
         };
         self.filters.iter().map(nothing).collect()
@@ -152,7 +152,7 @@ impl Measures {
         for (filter, seen) in self.filters.iter().zip(seen) {
             count(&mut seen.counts, &mut values);
             if filter.assured {
-                count(&mut seen.standings, &mut values);
+                count(&mut seen.assurance_statuses, &mut values);
             }
             for (peak, u) in seen.peaks.iter_mut().zip(values) {
                 *peak = peak.max(u.abs());
@@ -174,9 +174,9 @@ impl Measures {
         row.extend([Cell::Count(number), Cell::Count(choice.seed)]);
         row.extend(choice.values.iter().map(|value| Cell::Number(Some(*value))));
         let verdict = row.len();
-        for (filter, Seen { counts, standings, peaks }) in self.filters.iter().zip(seen) {
+        for (filter, Seen { counts, assurance_statuses, peaks }) in self.filters.iter().zip(seen) {
             row.extend(counts.iter().map(|count| Cell::Count(*count)));
-            row.extend(standings.iter().filter(|_| filter.assured).map(|count| Cell::Count(*count)));
+            row.extend(assurance_statuses.iter().filter(|_| filter.assured).map(|count| Cell::Count(*count)));
             row.extend(peaks.iter().map(|peak| Cell::Number(Some(*peak))));
             for plan in &filter.barriers {
                 let promise = promises.iter().find(|promise| promise.barrier == plan.name);
@@ -251,8 +251,8 @@ fn columns(campaign: &Campaign, filters: &[FilterPlan]) -> Vec<Column> {
             let meaning = format!("communication points with status {name}");
             add(format!("{}.status.{name}", filter.component), Kind::Count, "", &meaning);
         }
-        for standing in Standing::ALL.into_iter().filter(|_| filter.assured) {
-            let name = standing.name();
+        for assurance_status in AssuranceStatus::ALL.into_iter().filter(|_| filter.assured) {
+            let name = assurance_status.name();
             let meaning = format!("communication points at which the guarantee was {name}");
             add(format!("{}.assurance.{name}", filter.component), Kind::Count, "", &meaning);
         }

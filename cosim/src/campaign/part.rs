@@ -14,7 +14,7 @@ use uuid::Uuid;
 
 use crate::coupling::{Component, Model, Own};
 use crate::error::Error;
-use crate::host::{Anew, Description, Fmu, Participant};
+use crate::host::{Description, Fmu, Fresh, Participant};
 use crate::package;
 use crate::text;
 
@@ -126,7 +126,7 @@ impl Part {
             Self::Fmu { path, digest, description } => {
                 let fmu = Rc::new(open(path, digest, name)?);
                 let description = Rc::new(Description::clone(description));
-                Box::new(Anew::new(fmu, description, name).map_err(|e| e.in_component(name))?)
+                Box::new(Fresh::new(fmu, description, name).map_err(|e| e.in_component(name))?)
             }
         })
     }

@@ -357,8 +357,8 @@ pub fn run(
         let crew = Crew::new(campaign, &measures, options.threads)?;
         let mut done = before;
         for gap in gaps(&segments, &runs) {
-            let told = |made| tell(done + made);
-            let made = crew.work(gap, stop, &told, |first, rows| {
+            let reported = |made| tell(done + made);
+            let made = crew.work(gap, stop, &reported, |first, rows| {
                 let next = first + rows.len() as u64;
                 let path = parts.folder.join(format!("runs-{first:016}-{next:016}.parquet"));
                 let mut writer = Writer::create(&parts.unfinished(), measures.columns(), &[])?;

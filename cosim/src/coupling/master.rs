@@ -128,14 +128,14 @@ pub struct Simulation<P = Box<dyn Participant>> {
     standing_notes: usize,
     used: bool,
     /// Values that change in a run.
-    courses: Vec<Course>,
+    sequences: Vec<Sequence>,
     /// Set by somebody else to end a run.
     stop: Option<Arc<AtomicBool>>,
 }
 
 /// The sequence of values of a Real input or tunable parameter in a run, each for as many steps.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Course {
+pub struct Sequence {
     /// Position of the component.
     pub component: usize,
     /// Value reference.
@@ -324,7 +324,7 @@ impl<P: Participant> Simulation<P> {
             warnings,
             standing_notes: 0,
             used: false,
-            courses: Vec::new(),
+            sequences: Vec::new(),
             stop: None,
         };
         simulation.notes.extend(remarks);
@@ -353,18 +353,18 @@ impl<P: Participant> Simulation<P> {
     }
 
     /// Gives Real inputs and tunable parameters sequences of values, from the next run on, in place of any before.
-    pub fn set_courses(&mut self, courses: Vec<Course>) {
-        for course in &courses {
-            if let Some(first) = course.values.first() {
-                self.set_start(course.component, course.reference, *first);
+    pub fn set_sequences(&mut self, sequences: Vec<Sequence>) {
+        for sequence in &sequences {
+            if let Some(first) = sequence.values.first() {
+                self.set_start(sequence.component, sequence.reference, *first);
             }
         }
-        self.courses = courses;
+        self.sequences = sequences;
     }
 
     /// Sets the values of the sequences that begin at point `k`.
     fn change(&mut self, k: u64) -> Result<(), Error> {
-        for Course { component, reference, steps, values } in &self.courses {
+        for Sequence { component, reference, steps, values } in &self.sequences {
             let next = usize::try_from(k / steps).ok().filter(|_| k.is_multiple_of(*steps));
             if let Some(value) = next.and_then(|next| values.get(next)) {
                 let participant = &mut self.members[*component].participant;

@@ -20,7 +20,7 @@ pub use alone::alone;
 pub use grid::Grid;
 pub use in_process::InProcess;
 pub use interference::Interference;
-pub use master::{Course, Outcome, Simulation, Statistics};
+pub use master::{Outcome, Sequence, Simulation, Statistics};
 pub use model::{Model, Own, Reader};
 pub use network::{Link, Port, Units, links, port, unit_notes};
 pub use promises::{Kept, Promise, check_fed, verdict};

@@ -5,8 +5,8 @@
 //! Where a filter's outputs are read a step late (Jacobi order, no direct feedthrough), h is that of the point
 //! before.
 
-use punctual_core::filter::{Phase, Standing as Stands, Status};
-use punctual_core::judge::{Course, Judge, Judgement, Standing, Verdict};
+use punctual_core::filter::{AssuranceStatus, Phase, Status};
+use punctual_core::judge::{Interpolation, Judge, Judgement, PromiseState, Verdict};
 use punctual_fmu::configuration::over_seconds;
 use serde::Serialize;
 
@@ -140,7 +140,7 @@ pub(super) struct Ports {
     rearm: Option<Port>,
     /// The value reference of its deadline, and the value where none is set.
     deadline: Option<(u32, f64)>,
-    course: Course,
+    interpolation: Interpolation,
     /// Whether h belongs to the communication point at which it is read.
     prompt: bool,
     /// The measured states that are connected; of the first barrier only.
@@ -154,7 +154,7 @@ pub(super) struct Watched {
     /// The value reference of its deadline, and the value where none is set.
     pub(super) deadline: Option<(u32, f64)>,
     name: String,
-    course: Course,
+    interpolation: Interpolation,
     prompt: bool,
     status: usize,
     rearm: Option<usize>,
@@ -240,9 +240,9 @@ impl Zeros {
 }
 
 impl Run {
-    fn new(deadline: Option<f64>, course: Course) -> Self {
+    fn new(deadline: Option<f64>, interpolation: Interpolation) -> Self {
         Self {
-            judge: Judge::new(deadline, course),
+            judge: Judge::new(deadline, interpolation),
             deadline,
             before: None,
             rearm: false,
@@ -288,7 +288,7 @@ pub(super) fn ports(system: &System, descriptions: &[&Description], links: &[Lin
                 plans: output(PLANS).zip(output(&format!("{barrier}.{GUARANTEED}"))).map(|(a, g)| [a, g]),
                 rearm: description.index_of("rearm").map(|variable| Port { component, variable }),
                 deadline: parameter.and_then(|v| Some((v.value_reference, v.start?))),
-                course: if straight { Course::Straight } else { Course::Smooth },
+                interpolation: if straight { Interpolation::Straight } else { Interpolation::Smooth },
                 prompt: system.experiment().order == Order::GaussSeidel
                     && network::has_feedthrough(owner, description, h.variable),
                 states: std::mem::take(&mut states),
@@ -405,7 +405,7 @@ impl Watched {
             component: ports.status.component,
             deadline: ports.deadline,
             name: ports.name.clone(),
-            course: ports.course,
+            interpolation: ports.interpolation,
             prompt: ports.prompt,
             status: layout.slot(ports.status)?,
             rearm: ports.rearm.and_then(|port| layout.slot(port)),
@@ -415,14 +415,14 @@ impl Watched {
                 None => None,
             },
             states: ports.states.iter().filter_map(|port| layout.slot(*port)).collect(),
-            run: Run::new(None, ports.course),
+            run: Run::new(None, ports.interpolation),
         })
     }
 
     /// Forgets the run before; `deadline` in s after the first step is that of the next. Returns a note on a
     /// deadline that comes before the end of the first `step` (s).
     pub(super) fn reset(&mut self, deadline: Option<f64>, step: f64) -> Option<String> {
-        self.run = Run::new(deadline, self.course);
+        self.run = Run::new(deadline, self.interpolation);
         let deadline = deadline.filter(|deadline| *deadline < step)?;
         Some(format!(
             "{}: the deadline of {deadline} s is shorter than the step of {step} s: nothing is measured until it is over",
@@ -449,7 +449,7 @@ impl Watched {
         if rearm && !run.rearm && run.started {
             let judged = run.judge.judgement();
             run.before = run.before.filter(|before| before.verdict() == Verdict::Broken).or(Some(judged));
-            run.judge = Judge::new(run.deadline, self.course);
+            run.judge = Judge::new(run.deadline, self.interpolation);
             run.started = false;
             run.guaranteed = None;
         }
@@ -457,17 +457,17 @@ impl Watched {
         run.started |= !invalid;
         if run.started {
             if let Some([plans, guaranteed]) = self.plans.map(|slots| slots.map(|slot| values[slot])) {
-                run.refused |= plans == f64::from(Stands::Refused as u8);
+                run.refused |= plans == f64::from(AssuranceStatus::Refused as u8);
                 // A barrier that is let go is behind its promise.
                 let stands = guaranteed != 0.0 || is(Phase::Released);
                 run.guaranteed = Some(run.guaranteed != Some(false) && stands);
             }
-            let standing = match () {
-                () if is(Phase::Released) => Standing::Released,
-                () if is(Phase::Waiting) => Standing::Waiting,
-                () => Standing::InForce,
+            let promise_state = match () {
+                () if is(Phase::Released) => PromiseState::Released,
+                () if is(Phase::Waiting) => PromiseState::Waiting,
+                () => PromiseState::InForce,
             };
-            run.judge.see(time, h, standing, lost != 0.0 || is(Phase::Late));
+            run.judge.see(time, h, promise_state, lost != 0.0 || is(Phase::Late));
         }
         if unmet > 0.0 || invalid && is_armed {
             run.unmet += 1;

@@ -29,7 +29,7 @@ pub use description::{
     Array, Description, Fmi2Description, Fmi3Description, Output, Variable, Version, Written,
 };
 pub use number::{DataType, Family, whole_range};
-pub use participant::{Anew, Participant, Saved, Slave};
+pub use participant::{Fresh, Participant, Saved, Slave};
 pub use punctual_modeldescription::{Causality, DefaultExperiment, PLATFORM, Variability};
 
 pub(crate) use library::crash_at_once;

@@ -294,13 +294,13 @@ impl Participant for Box<dyn Participant> {
 }
 
 /// An instance of an FMU of others, made again for every run: what a reset forgets differs from FMU to FMU.
-pub struct Anew {
+pub struct Fresh {
     fmu: Rc<Fmu>,
     description: Rc<Description>,
     slave: Box<dyn Slave>,
 }
 
-impl Anew {
+impl Fresh {
     /// An instance of `fmu` called `name`.
     ///
     /// # Errors
@@ -316,7 +316,7 @@ impl Anew {
     }
 }
 
-impl Participant for Anew {
+impl Participant for Fresh {
     fn name(&self) -> &str {
         self.slave.name()
     }

@@ -27,10 +27,10 @@ pub(super) fn parse(text: &str) -> Result<Document<'_>, String> {
 /// none does, the first difference in the content.
 pub(super) fn of(here: &Document<'_>, there: &Document<'_>) -> Option<String> {
     let (here, there) = (here.root_element(), there.root_element());
-    let mut told = attributes(here, there);
+    let mut reported = attributes(here, there);
     // With another GUID, the rest belongs to another model.
-    told.sort_by_key(|difference| !difference.starts_with("guid "));
-    if told.is_empty() { children(here, there) } else { Some(told.join("; ")) }
+    reported.sort_by_key(|difference| !difference.starts_with("guid "));
+    if reported.is_empty() { children(here, there) } else { Some(reported.join("; ")) }
 }
 
 /// A value as a message shows it.
@@ -166,8 +166,8 @@ mod tests {
             assert_eq!(difference(from, to).as_deref(), Some(expected), "{from}");
         }
         let long = "ä".repeat(1000);
-        let told = difference("guid=\"g\"", &format!("guid=\"{long}\"")).expect("a difference");
-        assert_eq!(told, format!("guid is \"{}\"…, there \"g\"", "ä".repeat(SHOWN)));
+        let reported = difference("guid=\"g\"", &format!("guid=\"{long}\"")).expect("a difference");
+        assert_eq!(reported, format!("guid is \"{}\"…, there \"g\"", "ä".repeat(SHOWN)));
     }
 
     #[test]
@@ -178,8 +178,8 @@ mod tests {
             ("<fmiModelDescription fmiVersion=\"3.0\"/>", "fmiVersion is \"3.0\", must be \"2.0\""),
             ("<fmiModelDescription/>", "fmiVersion is not given, must be \"2.0\""),
         ] {
-            let told = parse(text).expect_err(text);
-            assert!(told.starts_with(expected), "{told}");
+            let reported = parse(text).expect_err(text);
+            assert!(reported.starts_with(expected), "{reported}");
         }
     }
 }

@@ -108,8 +108,8 @@ fn library(archive: &Archive, wanted: &[Wanted], platform: &str, entry: &str, fi
         Ok(_) => std::fs::read(&path),
         Err(error) => Err(error),
     };
-    let told = bytes.map_err(|e| e.to_string()).and_then(|bytes| exports(&bytes, platform));
-    match told {
+    let reported = bytes.map_err(|e| e.to_string()).and_then(|bytes| exports(&bytes, platform));
+    match reported {
         Err(message) => findings.archive("symbols.readable", entry, message),
         Ok(exported) => {
             for (functions, of) in wanted {

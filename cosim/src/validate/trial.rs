@@ -84,8 +84,8 @@ pub(super) fn run(path: &Path, limit: Duration, findings: &mut Findings) -> Resu
     ];
     let end = child.run(words, Voice::Silent, Some(limit))?;
     // Findings that the child wrote before its end. A line cut off by a crash is no finding.
-    let told = std::fs::read_to_string(findings_file(child.folder())).unwrap_or_default();
-    for finding in told.lines().filter_map(|line| serde_json::from_str(line).ok()) {
+    let reported = std::fs::read_to_string(findings_file(child.folder())).unwrap_or_default();
+    for finding in reported.lines().filter_map(|line| serde_json::from_str(line).ok()) {
         findings.push(finding);
     }
     match end {
@@ -137,7 +137,7 @@ pub fn perform(path: &Path, folder: &Path, limit: Duration) -> Result<(), Error>
     isolation::settle(folder)?;
     let file = findings_file(folder);
     let file = File::create(&file).map_err(|e| Error::io("write", &file, e))?;
-    let mut trial = Trial { file, limit, told: HashSet::new() };
+    let mut trial = Trial { file, limit, reported: HashSet::new() };
     match Fmu::open(path).map(Rc::new) {
         Ok(fmu) => trial.note(|trial| trial.all(&fmu)),
         Err(error) => trial.note(|_| Err(error)),
@@ -151,12 +151,12 @@ struct Trial {
     /// The time that the trial may take.
     limit: Duration,
     /// Rule and variable of the findings reported: the same finding at every step teaches nothing.
-    told: HashSet<(&'static str, Option<String>)>,
+    reported: HashSet<(&'static str, Option<String>)>,
 }
 
 impl Trial {
     fn tell(&mut self, rule: &'static str, variable: Option<&str>, message: &str) {
-        if !self.told.insert((rule, variable.map(str::to_owned))) {
+        if !self.reported.insert((rule, variable.map(str::to_owned))) {
             return;
         }
         let severity = severity(rule);
@@ -208,7 +208,7 @@ impl Trial {
         slave.reset()?;
         let second = self.pass(slave, description, &mut plan, true)?;
         let fmi = description.version().prefix();
-        let as_started = !self.told.iter().any(|(rule, _)| *rule == "trial.start");
+        let as_started = !self.reported.iter().any(|(rule, _)| *rule == "trial.start");
         for (name, a, b) in first.iter().zip(&second).map(|((name, a), (_, b))| (name, a, b)) {
             if as_started && a.to_bits() != b.to_bits() {
                 let text = format!(

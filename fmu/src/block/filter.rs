@@ -1,7 +1,7 @@
 //! A filter: it samples its inputs and remembers its promises.
 
 use punctual_core::filter::{
-    BarrierReport, Filter, FilterState, NoDerivative, SampleDerivative, Standing, Status,
+    AssuranceStatus, BarrierReport, Filter, FilterState, NoDerivative, SampleDerivative, Status,
 };
 use punctual_core::lie::Direction;
 use punctual_core::plan::Failure;
@@ -20,7 +20,7 @@ pub(super) struct FilterBlock {
     /// `rearm` at the last step: a rising edge re-arms.
     rearm_seen: bool,
     /// The status of the guarantee that was last logged.
-    noticed: Option<Standing>,
+    noticed: Option<AssuranceStatus>,
     /// Scratch: the state to go back to after looking ahead over a re-arming.
     kept: FilterState,
     /// Scratch: the derivative of a sample.
@@ -79,12 +79,12 @@ impl FilterBlock {
 
     /// Status of the guarantee, where plans are followed. They are not where a parameter that was set since asks for what
     /// none accounts for.
-    fn standing(&self) -> Option<(Standing, Option<Failure>)> {
-        let refused = (Standing::Refused, None);
+    fn assurance_status(&self) -> Option<(AssuranceStatus, Option<Failure>)> {
+        let refused = (AssuranceStatus::Refused, None);
         let assurance = self.filter.assurance();
         self.configuration
             .is_assured()
-            .then(|| assurance.map_or(refused, |assurance| (assurance.standing, assurance.failure)))
+            .then(|| assurance.map_or(refused, |assurance| (assurance.status, assurance.failure)))
     }
 
     /// The number of the output after those of the barriers.
@@ -100,9 +100,9 @@ impl FilterBlock {
     }
 
     /// Writes the status of the guarantee, why u_ref was changed, and at `t` until when the guarantee holds.
-    fn write_standing(&self, standing: Standing, t: f64, values: &mut Values) {
+    fn write_assurance_status(&self, assurance_status: AssuranceStatus, t: f64, values: &mut Values) {
         let at = self.after_barriers();
-        values.integers[at] = standing as i32;
+        values.integers[at] = assurance_status as i32;
         values.integers[at + 1] = self
             .filter
             .assurance()
@@ -142,8 +142,8 @@ impl FilterBlock {
         let at = self.layout.outputs + self.layout.inputs;
         values.integers[at] = report.status as i32;
         write_barriers(&report.barriers, at + 1, values);
-        if let Some((standing, _)) = self.standing() {
-            self.write_standing(standing, t, values);
+        if let Some((assurance_status, _)) = self.assurance_status() {
+            self.write_assurance_status(assurance_status, t, values);
         }
         if self.filter.integrated_input().is_some() {
             values.reals[self.integral()] = integrated;
@@ -237,23 +237,27 @@ impl Block for FilterBlock {
     }
 
     fn notice(&mut self) -> Option<String> {
-        let (standing, failure) = self.standing()?;
-        let stands = |standing| matches!(standing, Standing::Undecided | Standing::Assured);
-        let before = self.noticed.replace(standing);
-        if before == Some(standing) {
+        let (assurance_status, failure) = self.assurance_status()?;
+        let stands = |assurance_status| {
+            matches!(assurance_status, AssuranceStatus::Undecided | AssuranceStatus::Assured)
+        };
+        let before = self.noticed.replace(assurance_status);
+        if before == Some(assurance_status) {
             return None;
         }
-        if standing == Standing::Assured && before.is_some_and(|before| !stands(before)) {
+        if assurance_status == AssuranceStatus::Assured && before.is_some_and(|before| !stands(before)) {
             return Some("the guarantee is regained: a plan keeps the promise from here".to_owned());
         }
-        (!stands(standing)).then(|| {
+        (!stands(assurance_status)).then(|| {
             let why = match failure {
-                Some(failure) if standing == Standing::Refused => Some(self.configuration.refusal(failure)),
+                Some(failure) if assurance_status == AssuranceStatus::Refused => {
+                    Some(self.configuration.refusal(failure))
+                }
                 Some(failure) => Some(self.configuration.failure(failure)),
                 None => self.configuration.unaccounted(),
             };
             let why = why.map(|why| format!(": {why}")).unwrap_or_default();
-            format!("the guarantee is {} ({}){why}", standing.name(), standing.meaning())
+            format!("the guarantee is {} ({}){why}", assurance_status.name(), assurance_status.meaning())
         })
     }
 
@@ -319,9 +323,10 @@ impl Block for FilterBlock {
             }
             at += BARRIER_OUTPUTS.len();
         }
-        if let Some((standing, _)) = self.standing() {
-            let shown = if self.filter.assurance().is_some() { Standing::Undecided } else { standing };
-            self.write_standing(shown, 0.0, values);
+        if let Some((assurance_status, _)) = self.assurance_status() {
+            let shown =
+                if self.filter.assurance().is_some() { AssuranceStatus::Undecided } else { assurance_status };
+            self.write_assurance_status(shown, 0.0, values);
         }
         self.write_codes(values);
     }

@@ -124,8 +124,8 @@ impl Block for PlantBlock {
 
     fn output(&mut self, t: f64, values: &mut Values) {
         let seed = self.seed(values);
-        let told = &mut values.reals[self.layout.outputs..self.layout.parameters];
-        let (measured, others) = told.split_at_mut(self.layout.states);
+        let reported = &mut values.reals[self.layout.outputs..self.layout.parameters];
+        let (measured, others) = reported.split_at_mut(self.layout.states);
         measured.copy_from_slice(&self.x);
         if self.disturbance.is_of_measurements() {
             self.disturbance.blur(seed, t, measured);

@@ -19,26 +19,26 @@ pub(super) struct Adding<'a> {
     /// The index of the first state of the filter that is an input of this barrier.
     pub(super) first: usize,
     /// What becomes of it where its inputs enter at different orders.
-    pub(super) uneven: Uneven<'a>,
+    pub(super) mixed_degree: MixedDegree<'a>,
 }
 
 /// What becomes of barriers whose inputs enter at different orders.
-pub(super) enum Uneven<'a> {
+pub(super) enum MixedDegree<'a> {
     /// They are refused: one row cannot use every input.
     Refused,
     /// They are taken: plans use every input.
     Taken,
     /// They are taken, and reported by their index with what was found.
-    Told(&'a mut Vec<(usize, RelativeDegree)>),
+    Reported(&'a mut Vec<(usize, RelativeDegree)>),
 }
 
-impl Uneven<'_> {
+impl MixedDegree<'_> {
     /// The same, for one barrier.
-    pub(super) fn reborrow(&mut self) -> Uneven<'_> {
+    pub(super) fn reborrow(&mut self) -> MixedDegree<'_> {
         match self {
-            Self::Refused => Uneven::Refused,
-            Self::Taken => Uneven::Taken,
-            Self::Told(list) => Uneven::Told(list),
+            Self::Refused => MixedDegree::Refused,
+            Self::Taken => MixedDegree::Taken,
+            Self::Reported(list) => MixedDegree::Reported(list),
         }
     }
 }
@@ -57,8 +57,8 @@ impl Adding<'_> {
         driven: impl FnOnce() -> Option<RelativeDegree>,
     ) -> Result<usize, Error> {
         // A plan moves every input, whatever the row moves.
-        let n = match (&self.uneven, found.least()) {
-            (Uneven::Taken | Uneven::Told(_), Some(n)) => n,
+        let n = match (&self.mixed_degree, found.least()) {
+            (MixedDegree::Taken | MixedDegree::Reported(_), Some(n)) => n,
             _ => found.clone().require(None)?,
         };
         // The row is right, but other inputs may come in later.
@@ -66,19 +66,19 @@ impl Adding<'_> {
             RelativeDegree::Uniform(_) => driven().filter(|d| matches!(d, RelativeDegree::Mixed(_))),
             _ => Some(found),
         };
-        match &mut self.uneven {
-            Uneven::Told(list) => {
+        match &mut self.mixed_degree {
+            MixedDegree::Reported(list) => {
                 list.extend(
                     later().filter(|later| later.least() == Some(n)).map(|later| (self.index, later)),
                 );
             }
             // What no row limits has to be limited by bounds.
-            Uneven::Refused if self.configuration.has_free_input() => {
+            MixedDegree::Refused if self.configuration.has_free_input() => {
                 if let Some(later) = later().filter(|later| self.configuration.frees_later(later, n)) {
                     later.require(None)?;
                 }
             }
-            Uneven::Refused | Uneven::Taken => {}
+            MixedDegree::Refused | MixedDegree::Taken => {}
         }
         Ok(n)
     }
@@ -241,18 +241,18 @@ impl FilterConfiguration {
         if let Some(found) = error.relative_degree() {
             let inputs = self.plant.inputs();
             let name = |i: usize| inputs.get(i).map_or("u", |s| &s.name).to_owned();
-            let uneven = |advice: &str| {
+            let mixed_degree = |advice: &str| {
                 format!(
                     "; one row cannot use them all. Plans can, but none are followed: {}. Mend that{advice}",
                     self.unassured()
                 )
             };
             let advice = match (self.plant.model(), found) {
-                (Some(ModelName::BicycleSmallSlip), _) => uneven(
+                (Some(ModelName::BicycleSmallSlip), _) => mixed_degree(
                     ", or take the model bicycle_small_slip_rate or bicycle_kinematic, with `[integrator]` where the plant is steered by the angle itself",
                 ),
-                (None, RelativeDegree::Mixed(orders)) => uneven(&integrators(orders, name)),
-                (None, RelativeDegree::Varying(_)) => uneven(""),
+                (None, RelativeDegree::Mixed(orders)) => mixed_degree(&integrators(orders, name)),
+                (None, RelativeDegree::Varying(_)) => mixed_degree(""),
                 (None, RelativeDegree::NotFinite) => "; give the states a range (`min`, `max`)".to_owned(),
                 (Some(_), RelativeDegree::NotFinite) => "; its numbers are too large".to_owned(),
                 _ => String::new(),

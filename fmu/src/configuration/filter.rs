@@ -8,7 +8,7 @@ use punctual_core::lie::RelativeDegree;
 use punctual_core::plan::{Failure, Names};
 use serde::{Deserialize, Serialize};
 
-use super::adding::{Adding, Uneven, not_affine};
+use super::adding::{Adding, MixedDegree, not_affine};
 use super::alone::within;
 use super::barrier::RawBarrier;
 use super::key::{
@@ -577,20 +577,20 @@ impl FilterConfiguration {
     ///
     /// A number outside its range, or a lower input bound above its upper bound.
     pub fn build(&self) -> Result<Filter, ConfigurationError> {
-        self.built(if self.is_assured() { Uneven::Taken } else { Uneven::Refused })
+        self.built(if self.is_assured() { MixedDegree::Taken } else { MixedDegree::Refused })
     }
 
     /// The barriers, by their index, whose inputs enter at different orders, with what was found: only plans move them all.
-    pub fn uneven(&self) -> Vec<(usize, RelativeDegree)> {
-        let mut uneven = Vec::new();
-        match self.built(Uneven::Told(&mut uneven)) {
-            Ok(_) => uneven,
+    pub fn mixed_degree(&self) -> Vec<(usize, RelativeDegree)> {
+        let mut mixed_degree = Vec::new();
+        match self.built(MixedDegree::Reported(&mut mixed_degree)) {
+            Ok(_) => mixed_degree,
             Err(_) => Vec::new(),
         }
     }
 
     /// The filter, with what becomes of barriers whose inputs enter at different orders.
-    pub(super) fn built(&self, mut uneven: Uneven<'_>) -> Result<Filter, ConfigurationError> {
+    pub(super) fn built(&self, mut mixed_degree: MixedDegree<'_>) -> Result<Filter, ConfigurationError> {
         let inputs = self.plant.inputs();
         let states = self.plant.states().len();
         let mut next_point = states;
@@ -599,8 +599,9 @@ impl FilterConfiguration {
         for (i, section) in self.barrier.iter().enumerate() {
             let first = next_point;
             next_point += section.inputs(&self.plant).len();
-            let uneven = uneven.reborrow();
-            builder = section.shape.add(Adding { configuration: self, builder, index: i, first, uneven })?;
+            let mixed_degree = mixed_degree.reborrow();
+            builder =
+                section.shape.add(Adding { configuration: self, builder, index: i, first, mixed_degree })?;
             let (begin, end) = self.window(i)?;
             let strictness = match (section.penalty, section.priority) {
                 (Some(_), Some(_)) => {
@@ -709,7 +710,7 @@ impl FilterConfiguration {
 
     /// What no plan accounts for, each with its key, in words.
     fn obstacles(&self) -> Vec<String> {
-        match self.built(Uneven::Taken) {
+        match self.built(MixedDegree::Taken) {
             Ok(filter) => self.obstacles_of(&filter),
             Err(error) => vec![error.to_string()],
         }

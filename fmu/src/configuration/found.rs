@@ -51,7 +51,7 @@ impl Refusal {
     }
 
     /// The same refusal, once its path is whole: with the header that was meant.
-    fn told(mut self) -> Self {
+    fn reported(mut self) -> Self {
         self.message += &match &self.meant {
             Some((Meant::ListOfTables, header)) => format!("; a list of tables is written [[{header}]]"),
             Some((Meant::Table, header)) => format!("; one table is written [{header}]"),
@@ -161,7 +161,7 @@ impl serde::de::Error for Refusal {
 
 /// Reads a value from the tables of a text.
 pub(super) fn read<T: DeserializeOwned>(table: &DeTable<'_>) -> Result<T, Refusal> {
-    T::deserialize(MapAccessDeserializer::new(Entries::of(table))).map_err(Refusal::told)
+    T::deserialize(MapAccessDeserializer::new(Entries::of(table))).map_err(Refusal::reported)
 }
 
 /// A value.

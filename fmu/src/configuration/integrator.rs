@@ -6,7 +6,7 @@ use punctual_core::filter::{Filter, Integration, Plans};
 use punctual_models::mentions;
 use serde::{Deserialize, Serialize};
 
-use super::adding::Uneven;
+use super::adding::MixedDegree;
 use super::filter::{AssuranceName, listed};
 use super::key::{
     Key, Section,
@@ -180,7 +180,7 @@ impl FilterConfiguration {
             }
         }
         // Rows alone need every input in the same derivative.
-        let filter = self.built(Uneven::Refused)?;
+        let filter = self.built(MixedDegree::Refused)?;
         match &self.integrator {
             None => Ok(filter),
             Some(section) => self.integrated(filter, section),

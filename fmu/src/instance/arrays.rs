@@ -162,10 +162,10 @@ impl Instance {
             return Err(format!("{} is not an output, so its dependencies are not reported", item.name));
         };
         Ok(outputs.iter().enumerate().flat_map(move |(k, output)| {
-            let told =
+            let reported =
                 output.initial_dependencies.as_ref().filter(|_| initial).or(output.dependencies.as_ref());
-            let told = told.map_or(&[][..], Vec::as_slice);
-            told.iter().map(move |&on| {
+            let reported = reported.map_or(&[][..], Vec::as_slice);
+            reported.iter().map(move |&on| {
                 let on_item = self.product.item_of(on as usize);
                 let element = on_item.element(on as usize);
                 (item.element(item.scalars.start + k), on_item.reference(), element)

@@ -1,8 +1,8 @@
-//! What a step with a witness costs: a distribution that is printed, and never asserted.
+//! What a step with a backup plan costs: a distribution that is printed, and never asserted.
 
 use std::time::Instant;
 
-use punctual_core::filter::{Driver, Standing};
+use punctual_core::filter::{AssuranceStatus, Driver};
 use punctual_core::plants::Unicycle;
 
 use super::cases;
@@ -51,7 +51,7 @@ fn times(obstacles: bool, steps: usize) -> (Vec<f64>, Vec<f64>, usize, usize) {
             let assurance =
                 filter.step(t, &x[..4], &wanted, &mut u).expect("right dimensions").assurance.expect("plans");
             let taken = clock.elapsed().as_secs_f64();
-            if assurance.standing != Standing::Assured {
+            if assurance.status != AssuranceStatus::Assured {
                 searches += 1;
                 first.extend((k == 0).then_some(taken));
                 break;

@@ -1,7 +1,7 @@
 //! Bicycles whose angle is a state that the filter commands the rate of (docs/bicycle.md, the plant's own model), with
-//! a witness.
+//! a backup plan.
 
-use punctual_core::filter::Standing;
+use punctual_core::filter::AssuranceStatus;
 use punctual_study::bicycles::Size;
 
 use super::cases;
@@ -41,7 +41,7 @@ fn table_of_assured_bicycles_with_an_integrator() {
     /// Part of the starts that has to be accepted; 0.97 is the goal, which the small slip misses.
     const ACCEPTED: f64 = 0.5;
     let starts = &starts()[..cases(2, 100).min(100) as usize];
-    println!("| vehicle | model and plant | starts | accepted | kept | withdrawn | driven by the plan |");
+    println!("| vehicle | model and plant | starts | accepted | kept | lost | driven by the plan |");
     println!("|---|---|---:|---:|---:|---:|---:|");
     let mut rows = Vec::new();
     for size in [Size::CAR, Size::LONG, Size::AGILE] {
@@ -50,7 +50,7 @@ fn table_of_assured_bicycles_with_an_integrator() {
                 on_every_core(starts.len() as u64, |i| run_assured(&case(size, plant, starts[i as usize])));
             let accepted = runs.iter().filter(|run| run.refused.is_none());
             let kept = accepted.clone().filter(|run| run.run.promises.iter().all(|p| p.left.is_none()));
-            let withdrawn = accepted.clone().filter(|run| run.standing != Standing::Assured).count();
+            let withdrawn = accepted.clone().filter(|run| run.status != AssuranceStatus::Assured).count();
             let steps = accepted.clone().map(|run| run.run.samples).sum::<usize>();
             let driven = accepted.clone().map(|run| run.driven).sum::<usize>();
             let (accepted, kept) = (accepted.count(), kept.count());

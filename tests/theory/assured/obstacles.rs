@@ -1,4 +1,4 @@
-//! Through ten obstacles with a witness: what is accepted is on time, kept and clear of all, and never infeasible.
+//! Through ten obstacles with a backup plan: what is accepted is on time, kept and clear of all, and never infeasible.
 
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{Driver, Status};

@@ -1,8 +1,8 @@
-//! What a witness survives that its filter was not told of: a delay, a weaker input, a slow actuator.
+//! Robustness of backup plans to what their filter does not know: a delay, a weaker input, a slow actuator.
 
 use std::fmt;
 
-use punctual_core::filter::Standing;
+use punctual_core::filter::AssuranceStatus;
 
 use super::cases;
 use crate::judge::case::{Case, Reference, Set};
@@ -49,8 +49,8 @@ impl fmt::Display for Difference {
 enum End {
     /// Assured until the end, and kept.
     Kept,
-    /// Withdrawn in so many words at that time in s; and broken later by so many m, or 0.
-    Withdrawn { at: f64, by: f64 },
+    /// Lost, as reported, at that time in s; and broken later by so many m, or 0.
+    Lost { at: f64, by: f64 },
     /// Broken while it was said to be assured, by so many m.
     Broken { by: f64 },
 }
@@ -75,16 +75,16 @@ fn case(plant: Plant, bounds: Input, start: [f64; 4]) -> Case {
 fn run(case: &Case, difference: Difference) -> Option<End> {
     let mut filter = case.assured();
     let (mut x, mut acting, mut before, mut said) = (case.start, [0.0; 2], [0.0; 2], true);
-    let (mut worst_said, mut worst, mut withdrawn) = (0.0_f64, 0.0_f64, f64::INFINITY);
+    let (mut worst_said, mut worst, mut lost) = (0.0_f64, 0.0_f64, f64::INFINITY);
     for k in 0..(END / STEP).round() as usize {
         let t = k as f64 * STEP;
         let (mut u, wanted) = ([0.0; 2], [-x[3], 0.0]);
         let assurance =
             filter.step(t, &x[..4], &wanted, &mut u).expect("right dimensions").assurance.expect("plans");
-        match (k, assurance.standing) {
-            (0, Standing::Refused) => return None,
-            (_, Standing::Assured) => {}
-            _ if said => (said, withdrawn) = (false, t),
+        match (k, assurance.status) {
+            (0, AssuranceStatus::Refused) => return None,
+            (_, AssuranceStatus::Assured) => {}
+            _ if said => (said, lost) = (false, t),
             _ => {}
         }
         for part in 0..PARTS {
@@ -113,7 +113,7 @@ fn run(case: &Case, difference: Difference) -> Option<End> {
     Some(match (worst_said > 0.0, said) {
         (true, _) => End::Broken { by: worst_said },
         (false, true) => End::Kept,
-        (false, false) => End::Withdrawn { at: withdrawn, by: worst },
+        (false, false) => End::Lost { at: lost, by: worst },
     })
 }
 
@@ -127,7 +127,7 @@ fn outside(case: &Case, t: f64, x: &State) -> f64 {
 
 /// As documented in docs/guarantees.md.
 #[test]
-fn table_of_what_a_witness_survives() {
+fn table_of_what_a_backup_plan_survives() {
     let count = cases(1, 200);
     // Speeds up to 5 m/s, headings over the full turn.
     let starts: Vec<[f64; 4]> = drawn(count as usize);
@@ -138,8 +138,8 @@ fn table_of_what_a_witness_survives() {
     ];
     let differences = [Difference::None, Difference::Delay, Difference::Weak(0.1), Difference::Lag(0.05)];
     println!(
-        "| vehicle | difference | accepted | kept | withdrawn | of these kept all the same | by at most, median | \
-         first withdrawn | broken while assured | by at most |"
+        "| vehicle | difference | accepted | kept | lost | of these kept all the same | by at most, median | \
+         first lost | broken while assured | by at most |"
     );
     println!("|---|---|---:|---:|---:|---:|---:|---:|---:|---:|");
     let mut exact = Vec::new();
@@ -153,22 +153,22 @@ fn table_of_what_a_witness_survives() {
                 on_every_core(count, |i| run(&case(plant, bounds, start(starts[i as usize])), difference));
             let ends: Vec<End> = ends.into_iter().flatten().collect();
             let kept = ends.iter().filter(|end| **end == End::Kept).count();
-            let mut withdrawn: Vec<[f64; 2]> = ends
+            let mut lost: Vec<[f64; 2]> = ends
                 .iter()
-                .filter_map(|end| if let End::Withdrawn { at, by } = *end { Some([by, at]) } else { None })
+                .filter_map(|end| if let End::Lost { at, by } = *end { Some([by, at]) } else { None })
                 .collect();
-            withdrawn.sort_by(|a, b| a[0].total_cmp(&b[0]));
-            let by = |k: usize| withdrawn.get(k).map_or(0.0, |[by, _]| *by);
+            lost.sort_by(|a, b| a[0].total_cmp(&b[0]));
+            let by = |k: usize| lost.get(k).map_or(0.0, |[by, _]| *by);
             let broken =
                 ends.iter().filter_map(|end| if let End::Broken { by } = end { Some(*by) } else { None });
             println!(
                 "| {name} | {difference} | {} of {count} | {kept} | {} | {} | {:.3} m, {:.3} m | {:.2} s | {} | {:.3} m |",
                 ends.len(),
-                withdrawn.len(),
-                withdrawn.iter().filter(|[by, _]| *by == 0.0).count(),
-                by(withdrawn.len().saturating_sub(1)),
-                by(withdrawn.len() / 2),
-                withdrawn.iter().map(|[_, at]| *at).fold(f64::INFINITY, f64::min),
+                lost.len(),
+                lost.iter().filter(|[by, _]| *by == 0.0).count(),
+                by(lost.len().saturating_sub(1)),
+                by(lost.len() / 2),
+                lost.iter().map(|[_, at]| *at).fold(f64::INFINITY, f64::min),
                 ends.iter().filter(|end| matches!(end, End::Broken { .. })).count(),
                 broken.fold(0.0, f64::max),
             );

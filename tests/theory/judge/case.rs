@@ -183,7 +183,7 @@ impl Case {
         builder.build().expect("a valid filter")
     }
 
-    /// The same with a witness.
+    /// The same with a backup plan.
     pub(crate) fn assured(&self) -> Filter {
         self.filter().with_plans(self.step).expect("a filter that can be assured")
     }

@@ -72,10 +72,10 @@ impl Family {
     }
 }
 
-/// The most samples until a deadline of [`assured`]: a step with a witness takes a thousand times as long.
+/// The most samples until a deadline of [`assured`]: a step with a backup plan takes a thousand times as long.
 const MOST_SAMPLES: f64 = 200.0;
 
-/// The case that belongs to a seed, for a filter with a witness: a plant with a goal and obstacles, inputs bounded,
+/// The case that belongs to a seed, for a filter with a backup plan: a plant with a goal and obstacles, inputs bounded,
 /// nothing moving, any of five ways to choose u_ref.
 pub(crate) fn assured(seed: u64) -> Case {
     let mut numbers = Numbers::new(seed);

@@ -1,6 +1,6 @@
 //! Runs a case and judges it.
 
-use punctual_core::filter::{Driver, Phase, Report, Standing, Status};
+use punctual_core::filter::{AssuranceStatus, Driver, Phase, Report, Status};
 use punctual_core::plan::Failure;
 
 use super::case::{Case, Numbers};
@@ -102,14 +102,14 @@ pub(crate) fn run(case: &Case) -> Run {
     run_seen(case, |_, _, _, _| {})
 }
 
-/// Result of a run with a witness. A promise counts as flagged while it is assured.
+/// Result of a run with a backup plan. A promise counts as flagged while it is assured.
 #[derive(Clone, Debug)]
 pub(crate) struct AssuredRun {
     pub(crate) run: Run,
     /// Why the start was refused, if it was. Then there is no run.
     pub(crate) refused: Option<Failure>,
     /// Where the promises stand at the end.
-    pub(crate) standing: Standing,
+    pub(crate) status: AssuranceStatus,
     /// Samples at which the plan drove, and those that were infeasible while it was assured.
     pub(crate) driven: usize,
     pub(crate) infeasible: usize,
@@ -126,7 +126,7 @@ impl AssuredRun {
     }
 }
 
-/// Runs `case` with a witness, every hold told. What is refused at the start is not run.
+/// Runs `case` with a backup plan, every hold told. What is refused at the start is not run.
 pub(crate) fn run_assured(case: &Case) -> AssuredRun {
     let mut filter = case.assured();
     let (states, inputs) = (case.plant.states(), case.plant.inputs());
@@ -138,7 +138,7 @@ pub(crate) fn run_assured(case: &Case) -> AssuredRun {
     let mut run = AssuredRun {
         run: Run { promises: Vec::new(), samples: 0, ended: false },
         refused: None,
-        standing: Standing::Undecided,
+        status: AssuranceStatus::Undecided,
         driven: 0,
         infeasible: 0,
     };
@@ -150,8 +150,8 @@ pub(crate) fn run_assured(case: &Case) -> AssuredRun {
         let assurance =
             filter.step(t, &x[..states], &wanted[..inputs], &mut u[..inputs]).expect("right dimensions");
         let assurance = assurance.assurance.expect("plans");
-        run.standing = assurance.standing;
-        if run.standing == Standing::Refused {
+        run.status = assurance.status;
+        if run.status == AssuranceStatus::Refused {
             run.refused = assurance.failure;
             break;
         }
@@ -240,7 +240,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// The same of promises that a witness keeps, where it does so by its number: nothing before the deadline.
+    /// The same of promises that a backup plan keeps, where it does so by its number: nothing before the deadline.
     fn sample_assured(&mut self, t: f64, hold: f64, report: &Report, assured: impl Fn(usize) -> bool) {
         self.sample(t, hold, report);
         for (i, set) in self.case.sets.iter().enumerate() {

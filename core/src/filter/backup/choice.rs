@@ -1,10 +1,10 @@
-//! The input of a sample: u_ref where a plan stands behind it, else as near to it as one does.
+//! The input of a sample: u_ref where a plan backs it, else as near to it as one does.
 
 use super::planning::{AMPLE, Planning};
-use super::{Driver, Reason, Standing};
+use super::{AssuranceStatus, Driver, Reason};
 use crate::MAX_INPUTS;
 use crate::filter::rows::Rows;
-use crate::plan::{Failure, Plan, Planner, Sought, Witness};
+use crate::plan::{BackupPlan, Failure, Plan, Planner, SearchProgress};
 use crate::scalar::all_finite;
 
 /// Largest input of a plan that is comfortable where every set has been reached, as a part of its bounds.
@@ -27,7 +27,7 @@ const SMOOTH: f64 = 0.15;
 const FIRST: f64 = 0.125;
 const BISECTIONS: u32 = 3;
 /// The part of an input that goes back from the plan at each sample: all of it at once would have the plan take it again at the
-/// next, and the input jump between the two. And that where another plan stands behind all of u_ref.
+/// next, and the input jump between the two. And that where another plan backs all of u_ref.
 const GIVEN_BACK: f64 = 1.0 / 32.0;
 const RETURNED: f64 = 8.0;
 /// The samples after which the plan gives back, where it had to take more.
@@ -41,14 +41,14 @@ const PAUSES: [u32; 2] = [8, 128];
 /// How u_ref has its way, from sample to sample.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(super) struct Way {
+pub(super) struct ChoiceMemory {
     /// The largest input of a plan that is comfortable, as a part of its bounds: by what the first one needs, and u_ref has had since.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     ease: f64,
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     eagerness: f64,
     /// The search for a plan behind u_ref, and the samples until it goes on.
-    sought: Sought,
+    progress: SearchProgress,
     wait: u32,
     /// The samples of the last pause between trials, and those since that u_ref was let pass in a row.
     pause: u32,
@@ -63,20 +63,20 @@ pub(super) struct Way {
     pub(super) reason: Option<Reason>,
 }
 
-impl Way {
+impl ChoiceMemory {
     /// The first, beside the first plan.
-    pub(super) fn beside(first: &Witness) -> Self {
+    pub(super) fn beside(first: &BackupPlan) -> Self {
         Self { ease: (EASE * first.effort).min(first.effort.max(LEISURE)), wished: true, ..Self::default() }
     }
 
     /// Whether it is none that a filter had.
     pub(super) fn is_flawed(&self) -> bool {
-        self.ease.is_nan() || self.eagerness.is_nan() || self.sought.is_flawed()
+        self.ease.is_nan() || self.eagerness.is_nan() || self.progress.is_flawed()
     }
 
     /// Notes that a plan was found, and whether another one drove.
     fn find(&mut self, drove: bool) {
-        self.sought = Sought::default();
+        self.progress = SearchProgress::default();
         if drove {
             // The plan gives way in as many samples.
             (self.pause, self.wait) = (self.longer(), (1.0 / (RETURNED * GIVEN_BACK)) as u32);
@@ -86,7 +86,7 @@ impl Way {
 
     /// Notes that the search came to its end and found none.
     fn give_up(&mut self) {
-        self.sought = Sought::default();
+        self.progress = SearchProgress::default();
         self.pause = self.longer();
         self.wait = self.pause;
     }
@@ -144,8 +144,8 @@ pub(super) struct Chosen {
     pub(super) piece: Piece,
     /// The part of it that is the plan's own.
     pub(super) share: f64,
-    pub(super) witness: Witness,
-    /// A new plan, whose witness that is.
+    pub(super) backup_plan: BackupPlan,
+    /// A new plan, whose backup plan that is.
     pub(super) plan: Option<Plan>,
 }
 
@@ -168,7 +168,7 @@ struct Choice<'a, 'p> {
     t: f64,
     x: &'a [f64],
     wish: Wish<'a>,
-    /// The plan at hand, and the part of the last input that was its own.
+    /// The current plan, and the part of the last input that was its own.
     plan: &'a Plan,
     share: f64,
     /// Whether u_ref is a number; whether the plan has no part in the input, so that u_ref passes where it may.
@@ -192,21 +192,21 @@ impl Planning<'_> {
         planner: &Planner<'_>,
         (t, x): (f64, &[f64]),
         wish: Wish<'_>,
-        way: &mut Way,
+        memory: &mut ChoiceMemory,
     ) -> Result<Chosen, Failure> {
         let share = self.before().share;
         let (is_wish, passes) = (all_finite(wish.wish), share <= GIVEN_BACK);
         if is_wish && passes {
-            way.eagerness = way.eagerness.max(self.bounds.part(wish.wanted));
+            memory.eagerness = memory.eagerness.max(self.bounds.part(wish.wanted));
         }
-        let comfort = if wish.reached { COMFORTABLE } else { way.ease.max(EAGER * way.eagerness) };
-        let (planning, plan, wished) = (self, &self.now().plan, way.wished);
+        let comfort = if wish.reached { COMFORTABLE } else { memory.ease.max(EAGER * memory.eagerness) };
+        let (planning, plan, wished) = (self, &self.now().plan, memory.wished);
         let choice = Choice { planning, planner, t, x, wish, plan, share, is_wish, passes, comfort, wished };
-        if let Some(chosen) = choice.u_ref(way).or_else(|| choice.rows()) {
+        if let Some(chosen) = choice.u_ref(memory).or_else(|| choice.rows()) {
             return Ok(chosen);
         }
         match planner.tail(plan, t, x) {
-            Ok(kept) => Ok(choice.from_plan(kept, way)),
+            Ok(kept) => Ok(choice.from_plan(kept, memory)),
             // The plant is not where the plan was: whatever else there is keeps the promise.
             Err(failure) => choice.any_other().ok_or(failure),
         }
@@ -220,8 +220,8 @@ impl Planning<'_> {
         chosen: Chosen,
         reached: bool,
     ) -> Chosen {
-        let Chosen { driver, mut piece, ref witness, .. } = chosen;
-        let (mut u, last, inputs) = (witness.inputs[0].1, &self.rows.state.input, self.rows.input_dim);
+        let Chosen { driver, mut piece, ref backup_plan, .. } = chosen;
+        let (mut u, last, inputs) = (backup_plan.inputs[0].1, &self.rows.state.input, self.rows.input_dim);
         for (i, (u, last)) in u.iter_mut().zip(last).enumerate().take(inputs) {
             let most = SMOOTH * (self.bounds.max[i] - self.bounds.min[i]);
             let smooth = u.max(last - most).min(last + most);
@@ -229,28 +229,30 @@ impl Planning<'_> {
         }
         let is_smooth = !piece.held.contains(&true);
         // u_ref jumps where it wishes to, but not to it from another.
-        let goes_on = driver == Driver::Reference && self.before().way.wished;
-        if goes_on || self.before().standing != Standing::Assured || is_smooth {
+        let goes_on = driver == Driver::Reference && self.before().memory.wished;
+        if goes_on || self.before().status != AssuranceStatus::Assured || is_smooth {
             return chosen;
         }
         let smooth = &u[..inputs];
         let plan = chosen.plan.as_ref().unwrap_or(&self.now().plan);
         let driver = Driver::Between;
-        if let Ok(witness) = planner.behind(plan, t, x, smooth) {
-            return Chosen { driver, piece, witness, ..chosen };
+        if let Ok(backup_plan) = planner.behind(plan, t, x, smooth) {
+            return Chosen { driver, piece, backup_plan, ..chosen };
         }
-        let renewed = || planner.renewed(plan, t, x, smooth, &mut Sought::default()).ok();
+        let renewed = || planner.renewed(plan, t, x, smooth, &mut SearchProgress::default()).ok();
         // Where u_ref has just passed, one behind it is sought first.
         let may_renew = !reached && self.before().share > GIVEN_BACK;
         match may_renew.then(renewed).flatten() {
-            Some(plan) => Chosen { driver, piece, witness: plan.witness.clone(), plan: Some(plan), ..chosen },
+            Some(plan) => {
+                Chosen { driver, piece, backup_plan: plan.backup_plan.clone(), plan: Some(plan), ..chosen }
+            }
             None => chosen,
         }
     }
 }
 
 impl Choice<'_, '_> {
-    fn behind(&self, plan: &Plan, u: &[f64]) -> Option<Witness> {
+    fn behind(&self, plan: &Plan, u: &[f64]) -> Option<BackupPlan> {
         self.planner.behind(plan, self.t, self.x, u).ok()
     }
 
@@ -261,9 +263,9 @@ impl Choice<'_, '_> {
 
     /// Whether a plan is comfortable. Where every set has been reached: with the margin that the rows aim at and gently, as long as
     /// u_ref has its way; where the rows took over they let it pass, or it is far from every edge.
-    fn is_comfortable(&self, witness: &Witness) -> bool {
-        let is_gentle = witness.effort <= self.comfort;
-        let Some(at) = witness.tightest.filter(|_| self.wish.reached) else {
+    fn is_comfortable(&self, backup_plan: &BackupPlan) -> bool {
+        let is_gentle = backup_plan.effort <= self.comfort;
+        let Some(at) = backup_plan.tightest.filter(|_| self.wish.reached) else {
             return is_gentle || self.wish.reached;
         };
         let Rows { slots, workspace, .. } = self.planning.rows;
@@ -278,33 +280,33 @@ impl Choice<'_, '_> {
         at.slack >= least.max(margin)
     }
 
-    /// u_ref as it is or within its bounds, with a comfortable plan behind it: the one at hand, that moved in time, or another. Notes
-    /// why not.
-    fn u_ref(&self, way: &mut Way) -> Option<Chosen> {
+    /// u_ref as it is or within its bounds, with a comfortable plan behind it: the current one, that moved in time, or
+    /// another. Notes why not.
+    fn u_ref(&self, memory: &mut ChoiceMemory) -> Option<Chosen> {
         if !(self.is_wish && self.passes) {
             return None;
         }
         let (planner, plan, wanted) = (self.planner, self.plan, self.wish.wanted);
         let driver = self.passed();
-        let chosen = |witness, plan| Chosen { driver, piece: Piece::WISH, share: 0.0, witness, plan };
+        let chosen = |backup_plan, plan| Chosen { driver, piece: Piece::WISH, share: 0.0, backup_plan, plan };
         let near = planner.behind(plan, self.t, self.x, wanted);
-        way.reason = match &near {
-            Ok(witness) => witness.tightest.map(|at| Reason { barrier: at.barrier, time: at.time }),
+        memory.reason = match &near {
+            Ok(backup_plan) => backup_plan.tightest.map(|at| Reason { barrier: at.barrier, time: at.time }),
             Err(Failure::Broken { barrier, time, .. }) => Some(Reason { barrier: *barrier, time: *time }),
             Err(_) => None,
         };
-        if let Ok(witness) = near {
-            let is_comfortable = self.is_comfortable(&witness);
-            way.reason = way.reason.filter(|_| !is_comfortable);
-            return is_comfortable.then(|| chosen(witness, None));
+        if let Ok(backup_plan) = near {
+            let is_comfortable = self.is_comfortable(&backup_plan);
+            memory.reason = memory.reason.filter(|_| !is_comfortable);
+            return is_comfortable.then(|| chosen(backup_plan, None));
         }
         if self.wish.reached {
             return None;
         }
         let moved = planner.moved(plan, self.t, self.x, wanted).ok();
-        let moved = moved.filter(|plan| self.is_comfortable(&plan.witness));
-        let plan = moved.or_else(|| self.sought(wanted, way, self.comfort))?;
-        Some(chosen(plan.witness.clone(), Some(plan)))
+        let moved = moved.filter(|plan| self.is_comfortable(&plan.backup_plan));
+        let plan = moved.or_else(|| self.continue_search(wanted, memory, self.comfort))?;
+        Some(chosen(plan.backup_plan.clone(), Some(plan)))
     }
 
     /// The answer of the rows where every set has been reached, or as near to u_ref from it as is comfortable, so that the input does not
@@ -314,38 +316,38 @@ impl Choice<'_, '_> {
             return None;
         }
         let Wish { wish, wanted, rows, .. } = self.wish;
-        let witness = self.behind(self.plan, rows)?;
-        let chosen = |driver, wish, witness| Chosen {
+        let backup_plan = self.behind(self.plan, rows)?;
+        let chosen = |driver, wish, backup_plan| Chosen {
             driver,
             piece: Piece::mixed(1.0 - wish, wish),
             share: 0.0,
-            witness,
+            backup_plan,
             plan: None,
         };
-        if !self.is_wish || wanted != wish || !self.is_comfortable(&witness) || rows == wish {
-            return Some(chosen(Driver::Rows, 0.0, witness));
+        if !self.is_wish || wanted != wish || !self.is_comfortable(&backup_plan) || rows == wish {
+            return Some(chosen(Driver::Rows, 0.0, backup_plan));
         }
         let comfortable =
-            |u: &[f64]| self.behind(self.plan, u).filter(|witness| self.is_comfortable(witness));
-        let (wish, witness) = towards(rows, wish, witness, comfortable);
-        Some(chosen(if wish > 0.0 { Driver::Eased } else { Driver::Rows }, wish, witness))
+            |u: &[f64]| self.behind(self.plan, u).filter(|backup_plan| self.is_comfortable(backup_plan));
+        let (wish, backup_plan) = towards(rows, wish, backup_plan, comfortable);
+        Some(chosen(if wish > 0.0 { Driver::Eased } else { Driver::Rows }, wish, backup_plan))
     }
 
     /// u_ref or the answer of the rows with any plan behind it.
     fn any_other(&self) -> Option<Chosen> {
         let wished = self.is_wish.then_some((self.passed(), Piece::WISH, self.wish.wanted));
         let mut others = wished.into_iter().chain([(Driver::Rows, Piece::ROWS, self.wish.rows)]);
-        let (driver, piece, witness) =
+        let (driver, piece, backup_plan) =
             others.find_map(|(driver, piece, u)| Some((driver, piece, self.behind(self.plan, u)?)))?;
-        Some(Chosen { driver, piece, share: 0.0, witness, plan: None })
+        Some(Chosen { driver, piece, share: 0.0, backup_plan, plan: None })
     }
 
     /// From the plan's own input, that of `kept`, towards u_ref or the rows: as near as can be at first, then as near as last, or a little
     /// more or less.
-    fn from_plan(&self, kept: Witness, way: &mut Way) -> Chosen {
+    fn from_plan(&self, kept: BackupPlan, memory: &mut ChoiceMemory) -> Chosen {
         let to_rows = self.wish.reached || !self.is_wish;
         let (own, far) = (kept.inputs[0].1, if to_rows { self.wish.rows } else { self.wish.wanted });
-        let mixed = |share: f64, witness, plan| {
+        let mixed = |share: f64, backup_plan, plan| {
             let part = 1.0 - share;
             let piece = if to_rows { Piece::mixed(part, 0.0) } else { Piece::mixed(0.0, part) };
             let driver = match share {
@@ -354,14 +356,14 @@ impl Choice<'_, '_> {
                 1.0 => Driver::Plan,
                 _ => Driver::Between,
             };
-            Chosen { driver, piece, share, witness, plan }
+            Chosen { driver, piece, share, backup_plan, plan }
         };
         let most = kept.effort.max(self.comfort);
-        let gentle = |witness: &Witness| witness.effort <= most;
+        let gentle = |backup_plan: &BackupPlan| backup_plan.effort <= most;
         if self.passes {
             let behind = |u: &[f64]| self.behind(self.plan, u).filter(gentle);
-            let (part, witness) = towards(&own[..far.len()], far, kept, behind);
-            return mixed(1.0 - part, witness, None);
+            let (part, backup_plan) = towards(&own[..far.len()], far, kept, behind);
+            return mixed(1.0 - part, backup_plan, None);
         }
         let between = |share: f64| -> [f64; MAX_INPUTS] {
             // All of it is itself, to the last bit.
@@ -370,43 +372,43 @@ impl Choice<'_, '_> {
             core::array::from_fn(|i| if i < far.len() { part(i) } else { 0.0 })
         };
         let returned = (self.share - RETURNED * GIVEN_BACK).max(0.0);
-        let gentler = (GENTLER * self.comfort).max(way.eagerness);
-        if !to_rows && let Some(other) = self.sought(self.wish.wanted, way, gentler) {
+        let gentler = (GENTLER * self.comfort).max(memory.eagerness);
+        if !to_rows && let Some(other) = self.continue_search(self.wish.wanted, memory, gentler) {
             // At once where the two plans lead apart.
             let gently = self.behind(&other, &between(returned)[..far.len()]);
-            let (share, witness) =
-                gently.map_or_else(|| (0.0, other.witness.clone()), |witness| (returned, witness));
-            return mixed(share, witness, Some(other));
+            let (share, backup_plan) = gently
+                .map_or_else(|| (0.0, other.backup_plan.clone()), |backup_plan| (returned, backup_plan));
+            return mixed(share, backup_plan, Some(other));
         }
         let shares =
             SHARES.map(|more| self.share + more * GIVEN_BACK).into_iter().filter(|share| *share < 1.0);
-        let first = way.returns.then_some(returned);
+        let first = memory.returns.then_some(returned);
         // On the way to a deadline the plan gives back to another one alone: u_ref leads off it.
-        let shares = shares.skip(usize::from(!to_rows || way.held > 0));
+        let shares = shares.skip(usize::from(!to_rows || memory.held > 0));
         let found = first.into_iter().chain(shares).find_map(|share| {
-            let witness = self.behind(self.plan, &between(share)[..far.len()]).filter(gentle)?;
-            Some((share, witness))
+            let backup_plan = self.behind(self.plan, &between(share)[..far.len()]).filter(gentle)?;
+            Some((share, backup_plan))
         });
-        let (share, witness) = found.unwrap_or((1.0, kept));
-        way.held = if share > self.share { HELD } else { way.held.saturating_sub(1) };
+        let (share, backup_plan) = found.unwrap_or((1.0, kept));
+        memory.held = if share > self.share { HELD } else { memory.held.saturating_sub(1) };
         if first.is_some_and(|first| share > first) {
-            (way.returns, way.wait) = (false, way.wait.max(way.pause));
+            (memory.returns, memory.wait) = (false, memory.wait.max(memory.pause));
         }
-        mixed(share, witness, None)
+        mixed(share, backup_plan, None)
     }
 
     /// A plan behind `u` that needs no more than `comfort` where one is sought at this sample, and is found.
-    fn sought(&self, u: &[f64], way: &mut Way, comfort: f64) -> Option<Plan> {
-        if way.wait > 0 {
+    fn continue_search(&self, u: &[f64], memory: &mut ChoiceMemory, comfort: f64) -> Option<Plan> {
+        if memory.wait > 0 {
             return None;
         }
-        match self.planner.renewed(self.plan, self.t, self.x, u, &mut way.sought) {
-            Ok(plan) if plan.witness.effort <= comfort => {
-                way.find(self.share > GIVEN_BACK);
+        match self.planner.renewed(self.plan, self.t, self.x, u, &mut memory.progress) {
+            Ok(plan) if plan.backup_plan.effort <= comfort => {
+                memory.find(self.share > GIVEN_BACK);
                 Some(plan)
             }
             Ok(_) | Err(false) => {
-                way.give_up();
+                memory.give_up();
                 None
             }
             Err(true) => None,
@@ -415,20 +417,20 @@ impl Choice<'_, '_> {
 }
 
 /// The part of the way `from` one input `to` another at the end of which there is the last one, of those tried, with a
-/// witness, and that; 0 for `from`, whose witness is `kept`.
+/// backup plan, and that; 0 for `from`, whose backup plan is `kept`.
 fn towards(
     from: &[f64],
     to: &[f64],
-    mut kept: Witness,
-    behind: impl Fn(&[f64]) -> Option<Witness>,
-) -> (f64, Witness) {
+    mut kept: BackupPlan,
+    behind: impl Fn(&[f64]) -> Option<BackupPlan>,
+) -> (f64, BackupPlan) {
     let (mut low, mut high, mut part, mut input) = (0.0, 1.0, FIRST, [0.0; MAX_INPUTS]);
     for _ in 0..=BISECTIONS {
         for (input, (from, to)) in input.iter_mut().zip(from.iter().zip(to)) {
             *input = from + part * (to - from);
         }
         match behind(&input[..from.len()]) {
-            Some(witness) => (low, kept) = (part, witness),
+            Some(backup_plan) => (low, kept) = (part, backup_plan),
             None if low == 0.0 => break,
             None => high = part,
         }

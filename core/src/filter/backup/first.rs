@@ -6,8 +6,8 @@ use super::planning::Planning;
 use super::state::Promise;
 use crate::MAX_INPUTS;
 use crate::elementary;
-use crate::filter::{Begin, Standing};
-use crate::plan::{Failure, Plan, Planner, Witness};
+use crate::filter::{AssuranceStatus, Begin};
+use crate::plan::{BackupPlan, Failure, Plan, Planner};
 
 /// Parts of the deadlines for which a plan is sought where none is found for the deadlines themselves: it keeps them too. Each
 /// makes a refusal longer by as much as the first search.
@@ -32,10 +32,10 @@ impl Planning<'_> {
     /// # Errors
     ///
     /// What the nearest trial fails at.
-    pub fn plan_from(&self, t: f64, x: &[f64], factor: f64) -> Result<Witness, Failure> {
+    pub fn plan_from(&self, t: f64, x: &[f64], factor: f64) -> Result<BackupPlan, Failure> {
         let x = &self.state(x)[..];
         let promises = self.promises(t, x, |_| factor);
-        self.first(promises, (t, self.plans.period), x, &[], &SHORTER).map(|first| first.plan.witness)
+        self.first(promises, (t, self.plans.period), x, &[], &SHORTER).map(|first| first.plan.backup_plan)
     }
 
     /// What [`Self::plan_from`] says of the deadlines themselves, and [`Self::earliest_deadline`], with one search for both.
@@ -44,11 +44,11 @@ impl Planning<'_> {
         t: f64,
         x: &[f64],
         longest: f64,
-    ) -> (Result<Witness, Failure>, Option<(f64, Witness)>) {
+    ) -> (Result<BackupPlan, Failure>, Option<(f64, BackupPlan)>) {
         let state = &self.state(x)[..];
         let promises = self.promises(t, state, |_| 1.0);
         match self.first(promises, (t, self.plans.period), state, &[], &SHORTER) {
-            Ok(first) => (Ok(first.plan.witness.clone()), self.least(t, x, longest, Some(first))),
+            Ok(first) => (Ok(first.plan.backup_plan.clone()), self.least(t, x, longest, Some(first))),
             Err(failure) => (Err(failure), self.least(t, x, longest, None)),
         }
     }
@@ -62,25 +62,26 @@ impl Planning<'_> {
     /// The least factor by which every deadline has to be multiplied for a plan from `x` at `t` to be found, to a
     /// fiftieth or less where a plan arrives sooner than it has to, and that plan. None is looked for beyond `longest` times the
     /// deadlines, nor where one would come after the end of its barrier.
-    pub fn earliest_deadline(&self, t: f64, x: &[f64], longest: f64) -> Option<(f64, Witness)> {
+    pub fn earliest_deadline(&self, t: f64, x: &[f64], longest: f64) -> Option<(f64, BackupPlan)> {
         self.appraise(t, x, longest).1
     }
 
     /// The same where [none is found](Self::plan_from) for the deadlines themselves, which is not tried again.
-    pub fn later_deadline(&self, t: f64, x: &[f64], longest: f64) -> Option<(f64, Witness)> {
+    pub fn later_deadline(&self, t: f64, x: &[f64], longest: f64) -> Option<(f64, BackupPlan)> {
         self.least(t, x, longest, None)
     }
 
-    /// The model's states along `witness` from the measured state `x` at `t`, in steps of at most `step` s, finite, > 0:
-    /// each with the input that is held from there until the next. The last is the rest, with the input that holds it.
+    /// The model's states along `backup_plan` from the measured state `x` at `t`, in steps of at most `step` s, finite, > 0:
+    /// each with the input that is held from there until the next. The last is the equilibrium, with the input that holds
+    /// it.
     pub fn trajectory(
         &self,
-        witness: &Witness,
+        backup_plan: &BackupPlan,
         t: f64,
         x: &[f64],
         step: f64,
     ) -> Vec<(f64, Vec<f64>, [f64; MAX_INPUTS])> {
-        self.along(witness, t, &self.state(x), step)
+        self.along(backup_plan, t, &self.state(x), step)
     }
 
     /// [`Self::earliest_deadline`], where `first` was found for the deadlines themselves.
@@ -90,7 +91,7 @@ impl Planning<'_> {
         x: &[f64],
         longest: f64,
         first: Option<First>,
-    ) -> Option<(f64, Witness)> {
+    ) -> Option<(f64, BackupPlan)> {
         let x = &self.state(x)[..];
         let promised = |factor: f64| self.promises(t, x, |_| factor);
         let arrived = |factor: f64, First { promises, plan, .. }: First| {
@@ -107,11 +108,11 @@ impl Planning<'_> {
         };
         let found = first.map(|first| arrived(1.0, first));
         let (factor, plan) = least_factor(self.longest(longest, |_| true), found, find, sooner)?;
-        Some((factor, plan.witness))
+        Some((factor, plan.backup_plan))
     }
 
     /// The first plan for `promises`, with their reserve, else without, else for deadlines that are one of the parts `shorter`
-    /// of theirs, else the one at hand.
+    /// of theirs, else the current one.
     pub(super) fn first(
         &self,
         mut promises: Vec<Option<Promise>>,
@@ -141,7 +142,7 @@ impl Planning<'_> {
         }
         let Err(failure) = found else { return found.map(|plan| First { promises, plan, is_old: false }) };
         let old = &self.before().plan;
-        if self.before().standing != Standing::Undecided || old.is_empty() {
+        if self.before().status != AssuranceStatus::Undecided || old.is_empty() {
             return Err(failure);
         }
         promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);
@@ -149,9 +150,9 @@ impl Planning<'_> {
         let tail = |planner: &Planner<'_>| planner.irregular(is_irregular).tail(old, at.0, x);
         match self.planned(&promises, at, u, tail) {
             // One that ends sooner reaches nothing.
-            Ok(witness) if promises.iter().flatten().all(|promise| promise.from < witness.until) => {
+            Ok(backup_plan) if promises.iter().flatten().all(|promise| promise.from < backup_plan.until) => {
                 let mut plan = old.clone();
-                plan.witness = witness;
+                plan.backup_plan = backup_plan;
                 Ok(First { promises, plan, is_old: true })
             }
             _ => Err(failure),
@@ -179,20 +180,20 @@ impl Planning<'_> {
 
     /// The part of the time until their deadlines that `plan`, which keeps `promises` from `x` at `t`, needs for them all, at most 1.
     pub(super) fn arrival(&self, promises: &[Option<Promise>], plan: &Plan, t: f64, x: &[f64]) -> f64 {
-        let end = plan.witness.inputs.last().map_or(t, |(end, _)| *end);
-        let way = self.along(&plan.witness, t, x, self.plans.period.max((end - t) / MOST_POINTS));
+        let end = plan.backup_plan.inputs.last().map_or(t, |(end, _)| *end);
+        let trajectory = self.along(&plan.backup_plan, t, x, self.plans.period.max((end - t) / MOST_POINTS));
         let mut part = 0.0_f64;
         for ((promise, slot), model) in promises.iter().zip(&self.rows.slots).zip(self.models()) {
             let Some(promise) = promise.filter(|p| p.from > t && slot.begin == Begin::AtOnce) else {
                 continue;
             };
             let least = promise.margin.max(promise.reserve);
-            let before = way.iter().take_while(|(at, ..)| *at < promise.from);
+            let before = trajectory.iter().take_while(|(at, ..)| *at < promise.from);
             let outside = before.enumerate().filter(|(_, (at, x, _))| {
                 let h = model.value(*at, x);
                 h.is_nan() || h < least
             });
-            let arrival = outside.last().and_then(|(k, _)| way.get(k + 1)).map_or(t, |(at, ..)| *at);
+            let arrival = outside.last().and_then(|(k, _)| trajectory.get(k + 1)).map_or(t, |(at, ..)| *at);
             part = part.max((arrival - t) / (promise.from - t));
         }
         let keeps = |part: f64| {

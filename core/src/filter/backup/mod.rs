@@ -1,5 +1,5 @@
 //! Backup plans: what a filter promises is decided at the first sample, and kept within the bounds whatever u_ref is
-//! (`docs/theory.md#witness`).
+//! (`docs/theory.md#backup-plan`).
 //!
 //! | module | owns |
 //! |---|---|
@@ -30,13 +30,13 @@ use super::{Begin, End, Filter, FilterState, NoDerivative, SampleDerivative};
 use crate::MAX_INPUTS;
 use crate::error::{Error, ErrorKind, positive};
 use crate::lie::Direction;
-use crate::plan::{Policy, Witness};
+use crate::plan::{BackupPlan, Policy};
 use crate::qp::Bounds;
 use choice::Piece;
 pub use planning::Planning;
 use sample::{At, Decision};
-pub use state::Commitment;
-pub use status::{Assurance, Driver, Reason, Standing};
+pub use state::PlanState;
+pub use status::{Assurance, AssuranceStatus, Driver, Reason};
 
 /// By how much a clock that is measured may be late, as a part of a hold.
 const JITTER: f64 = 0.05;
@@ -45,11 +45,11 @@ const JITTER: f64 = 0.05;
 const SHORTEST: f64 = 1e-3;
 const SHORTEST_INTEGRATED: f64 = 0.125;
 
-/// How a filter makes plans ([`Filter::with_plans`]). A number is a period, with plans that end at rest.
+/// How a filter makes plans ([`Filter::with_plans`]). A number is a period, with plans that end at an equilibrium.
 pub struct Plans {
     /// The time in s for which an input is held, finite, > 0.
     period: f64,
-    /// Where no plan ends at rest, how far one reaches, in s.
+    /// Where no plan ends at an equilibrium, how far one reaches, in s.
     horizon: Option<f64>,
     /// The most quadratic programs of a search at a sample after the first.
     search_budget: u32,
@@ -76,9 +76,10 @@ impl Plans {
         Self { period, horizon: None, search_budget: Self::SEARCH_BUDGET, policies, apart }
     }
 
-    /// Sets the time in s, finite, > 0, that a plan which does not end at rest has to reach past the last deadline and the sample;
-    /// promises are then kept [until its end](Assurance::until). Default `None`: a plan has to end at rest. For plants without a
-    /// rest, such as an aeroplane, and for sets that move for ever. It is tried to be prolonged before it ends.
+    /// Sets the time in s, finite, > 0, that a plan which does not end at an equilibrium has to reach past the last
+    /// deadline and the sample; promises are then kept [until its end](Assurance::until). Default `None`: a plan has to end
+    /// at an equilibrium. For plants without an equilibrium, such as an aeroplane, and for sets that move for ever. It is
+    /// tried to be prolonged before it ends.
     #[must_use]
     pub fn horizon(self, horizon: impl Into<Option<f64>>) -> Self {
         Self { horizon: horizon.into(), ..self }
@@ -101,7 +102,7 @@ impl Plans {
     }
 
     /// Says that the sets of each pair of barriers, by their numbers, have no state in common at any time. What needs both at
-    /// once is then refused without a search ([`Failure::Apart`](crate::plan::Failure::Apart)). Nothing else rests on it.
+    /// once is then refused without a search ([`Failure::Apart`](crate::plan::Failure::Apart)). Nothing else depends on it.
     #[must_use]
     pub fn apart(self, pairs: Vec<[usize; 2]>) -> Self {
         Self { apart: pairs, ..self }
@@ -130,16 +131,16 @@ impl Filter {
     /// of the plan itself.
     ///
     /// Assumed: the plant is the model, its state is measured exactly, and samples are one period apart. Where the plant was seen to
-    /// differ, and by half as much again a set might be left before the next sample, the promise is withdrawn for that sample. A sample
-    /// may be taken again at the same time, come sooner, or come late by a twentieth of a hold. Where the time to the next sample changes
-    /// and is [known](Self::expect_hold), a plan is sought for
+    /// differ, and by half as much again a set might be left before the next sample, the guarantee is lost for that sample.
+    /// A sample may be taken again at the same time, come sooner, or come late by a twentieth of a hold. Where the time to
+    /// the next sample changes and is [known](Self::expect_hold), a plan is sought for
     /// the new one; none found ends the promise. A sample that comes later ends it until the next one. Where x is not finite, the
     /// plan goes on as it is. A barrier without a deadline that [begins later](Begin::At) is promised from then on. A filter
     /// with bounds on disturbance or measurement errors, a delay, or a deadline for what begins later cannot be assured yet, and
     /// is refused. Sets must not move, unless [it is known](crate::barrier::Barrier::range_from) how low h
-    /// gets: at a rest each is looked at at eight later times, up to a day, and no plan is found where it has. With a
-    /// [horizon](Plans::horizon) they may, and the plant needs no rest: the promise then has an [end](Assurance::until), which
-    /// is put off. States must be those of the plant, not of something that others move.
+    /// gets: at an equilibrium each is checked at eight later times, up to a day, and no plan is found where it has. With a
+    /// [horizon](Plans::horizon) they may, and the plant needs no equilibrium: the promise then has an
+    /// [end](Assurance::until), which is put off. States must be those of the plant, not of something that others move.
     ///
     /// Plans account for the mean that a plant with an [integrator](Self::with_integrator) is given over each period, and keep the
     /// limits of the integral. The search allocates, as do the plans.
@@ -208,13 +209,13 @@ impl Filter {
                     refuse("begin", message);
                 }
                 (Begin::AfterArrival(_), _) => {
-                    refuse("begin", "is the arrival of another barrier, which no plan foresees".into());
+                    refuse("begin", "is the arrival of another barrier, which no plan can predict".into());
                 }
             }
             if slot.source.predict().is_none() {
                 refuse("source", "has no model to run ahead".into());
             } else if plans.horizon.is_none() && slot.end == End::Never && leaves(slot, rows.state_dim) {
-                let message = "moves with time, so that no plan ends; with a horizon one may end before";
+                let message = "moves with time, so that no plan ends; with a horizon one may end earlier";
                 refuse("source", message.into());
             }
         }
@@ -228,9 +229,9 @@ impl Filter {
     }
 
     /// The plan that keeps the promises after the last step, where there is one.
-    pub fn plan(&self) -> Option<&Witness> {
+    pub fn plan(&self) -> Option<&BackupPlan> {
         self.backup.as_ref()?;
-        self.rows.state.plan.witness()
+        self.rows.state.plan.backup_plan()
     }
 
     /// The planner, to ask for plans; `None` for a filter without them.
@@ -260,14 +261,14 @@ pub(super) struct Backup {
     /// The bounds of the model's inputs; of an integrated one those of a sample are tighter.
     bounds: Bounds,
     /// The sample that the reports are of.
-    looked: Option<Looked>,
+    preview: Option<Preview>,
     /// How the input of that sample moves with it.
     piece: Piece,
     assurance: Assurance,
 }
 
 /// A sample that was looked at, its input, and that of the model.
-struct Looked {
+struct Preview {
     t: f64,
     hold: f64,
     x: Vec<f64>,
@@ -278,7 +279,7 @@ struct Looked {
 
 impl Backup {
     fn new(plans: Plans, bounds: Bounds) -> Self {
-        Self { plans, bounds, looked: None, piece: Piece::ROWS, assurance: Assurance::default() }
+        Self { plans, bounds, preview: None, piece: Piece::ROWS, assurance: Assurance::default() }
     }
 
     pub(super) fn period(&self) -> f64 {
@@ -289,8 +290,8 @@ impl Backup {
         Planning { rows, integrator, plans: &self.plans, bounds: &self.bounds }
     }
 
-    /// Whether a plan stands behind the step at `t`, so that rows need not be met.
-    pub(super) fn is_behind(&self, plan: &Commitment, t: f64, hold: f64, integrates: bool) -> bool {
+    /// Whether a plan backs the step at `t`, so that rows need not be met.
+    pub(super) fn is_behind(&self, plan: &PlanState, t: f64, hold: f64, integrates: bool) -> bool {
         plan.is_followed() && plan.lost.is_none() && plan.in_time(t, self.planned_hold(hold, integrates))
     }
 
@@ -320,12 +321,12 @@ impl Backup {
 
     /// Writes the input of the sample that was looked at last, if it is the one with these arguments. Returns whether it did.
     pub(super) fn recall(&mut self, t: f64, hold: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> bool {
-        let looked = self.looked.take().filter(|looked| looked.is_at(t, hold, x, u_ref));
-        if let Some(looked) = &looked {
-            u.copy_from_slice(&looked.u[..u.len()]);
+        let preview = self.preview.take().filter(|preview| preview.is_at(t, hold, x, u_ref));
+        if let Some(preview) = &preview {
+            u.copy_from_slice(&preview.u[..u.len()]);
         }
-        self.looked = looked;
-        self.looked.is_some()
+        self.preview = preview;
+        self.preview.is_some()
     }
 
     /// Notes the sample that the reports are of, with the input `u` of the plant and `inside` of the model.
@@ -337,22 +338,22 @@ impl Backup {
         u: &[f64],
         inside: [f64; MAX_INPUTS],
     ) {
-        let mut looked = Looked { t, hold, x: x.to_vec(), u_ref: u_ref.to_vec(), u: inside, inside };
-        looked.u[..u.len()].copy_from_slice(u);
-        self.looked = Some(looked);
+        let mut preview = Preview { t, hold, x: x.to_vec(), u_ref: u_ref.to_vec(), u: inside, inside };
+        preview.u[..u.len()].copy_from_slice(u);
+        self.preview = Some(preview);
     }
 
     /// Forgets the sample that was looked at; returns its input of the model.
     pub(super) fn forget(&mut self) -> Option<[f64; MAX_INPUTS]> {
-        self.looked.take().map(|looked| looked.inside)
+        self.preview.take().map(|preview| preview.inside)
     }
 
     /// Goes on from the memory `plan`.
-    pub(super) fn restart(&mut self, plan: &Commitment) {
-        self.looked = None;
-        let (standing, failure) = (plan.standing, plan.failure);
-        let until = plan.witness().map(|witness| witness.until);
-        self.assurance = Assurance { standing, driver: Driver::Rows, failure, until, reason: None };
+    pub(super) fn restart(&mut self, plan: &PlanState) {
+        self.preview = None;
+        let (status, failure) = (plan.status, plan.failure);
+        let until = plan.backup_plan().map(|backup_plan| backup_plan.until);
+        self.assurance = Assurance { status, driver: Driver::Rows, failure, until, reason: None };
     }
 
     /// Checks a memory that is to be restored.
@@ -389,7 +390,7 @@ impl Backup {
     }
 }
 
-impl Looked {
+impl Preview {
     /// Whether it is the sample with these arguments, bit for bit.
     fn is_at(&self, t: f64, hold: f64, x: &[f64], u_ref: &[f64]) -> bool {
         let same = |a: &[f64], b: &[f64]| a.iter().map(|v| v.to_bits()).eq(b.iter().map(|v| v.to_bits()));
@@ -437,7 +438,7 @@ fn one_plant(rows: &Rows, period: f64) -> Result<(), Error> {
                 |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * (1.0 + a.abs()) || a.is_nan() && b.is_nan();
             if !ends[0].iter().zip(&ends[1]).all(same) {
                 let message = format!(
-                    "moves the state in another way than that of {}; a plan needs one plant for all barriers",
+                    "moves the state differently from that of {}; a plan needs one plant for all barriers",
                     first.name
                 );
                 return Err(Error::new(ErrorKind::Unsupported, "source", message).within(&slot.name));

@@ -3,13 +3,13 @@
 use alloc::vec::Vec;
 
 use super::Plans;
-use super::state::{Commitment, Promise};
+use super::state::{PlanState, Promise};
 use crate::MAX_INPUTS;
 use crate::filter::integrator::{Integrator, insert};
 use crate::filter::rows::{BarrierSlot, Rows};
 use crate::filter::{Begin, End, Integration, Strictness};
 use crate::lie::Predict;
-use crate::plan::{Failure, Integral, Limit, ON_TIME, Planner, Requirement, Witness, slopes};
+use crate::plan::{BackupPlan, Failure, Integral, Limit, ON_TIME, Planner, Requirement, slopes};
 use crate::qp::Bounds;
 
 /// Margin of a plan, as a part of the size of h at the first sample: for what the model leaves out between two samples. No
@@ -36,12 +36,12 @@ pub struct Planning<'a> {
 
 impl<'a> Planning<'a> {
     /// The memory before the sample.
-    pub(super) fn before(&self) -> &'a Commitment {
+    pub(super) fn before(&self) -> &'a PlanState {
         &self.rows.state.plan
     }
 
     /// The memory after the sample, as far as it is known.
-    pub(super) fn now(&self) -> &'a Commitment {
+    pub(super) fn now(&self) -> &'a PlanState {
         &self.rows.workspace.next.plan
     }
 
@@ -115,7 +115,7 @@ impl<'a> Planning<'a> {
             let after = |seconds: f64| t + seconds - ON_TIME * self.plans.period;
             let from = match (slot.begin, slot.promise.settings().deadline) {
                 (Begin::At(begin), _) if begin > 0.0 => after(begin),
-                // Not-a-number is asked for at once, and found by the check.
+                // NaN is asked for at once, and found by the check.
                 _ if h.is_nan() || h >= 0.0 => t,
                 (_, Some(deadline)) => after(factor(slot) * deadline),
                 (_, None) => return None,
@@ -128,7 +128,7 @@ impl<'a> Planning<'a> {
             let soft = matches!(slot.strictness, Strictness::Soft(_));
             let margin = margin(model, t, x, h);
             let firm = if from == t && h < AMPLE * margin { after(self.plans.period) } else { t };
-            // Half of the user's, so that a plan stands behind the rows, which aim at all of it.
+            // Half of the user's, so that a plan backs the rows, which aim at all of it.
             let reserve = slot.promise.settings().margin / AMPLE;
             // What is kept from now on may be nearer to its edge.
             let reserve = if from == t { reserve.min(h / AMPLE) } else { reserve };
@@ -252,24 +252,24 @@ impl<'a> Planning<'a> {
     /// [`Self::trajectory`] from the model's state `x`.
     pub(super) fn along(
         &self,
-        witness: &Witness,
+        backup_plan: &BackupPlan,
         t: f64,
         x: &[f64],
         step: f64,
     ) -> Vec<(f64, Vec<f64>, [f64; MAX_INPUTS])> {
-        let (mut at, mut x, mut way) = (t, x.to_vec(), Vec::new());
-        let Some(plant) = self.models().next() else { return way };
-        for (end, u) in &witness.inputs {
+        let (mut at, mut x, mut trajectory) = (t, x.to_vec(), Vec::new());
+        let Some(plant) = self.models().next() else { return trajectory };
+        for (end, u) in &backup_plan.inputs {
             let (begin, steps) = (at, ((end - at) / step) as usize + 1);
             for k in 1..=steps {
-                way.push((at, x.clone(), *u));
+                trajectory.push((at, x.clone(), *u));
                 let next = begin + (end - begin) * k as f64 / steps as f64;
                 plant.flow(&mut x, &u[..self.rows.input_dim], next - at);
                 at = next;
             }
         }
-        way.extend(witness.inputs.last().map(|(_, u)| (at, x, *u)));
-        way
+        trajectory.extend(backup_plan.inputs.last().map(|(_, u)| (at, x, *u)));
+        trajectory
     }
 
     /// The time in s at which a plan that ends at `until` is next tried to be prolonged, at `t`: when it has become as short
@@ -292,7 +292,7 @@ fn margin(model: &dyn Predict, t: f64, x: &[f64], h: f64) -> f64 {
     slopes(model, t, x, &mut gradient);
     let resolved: f64 =
         x.iter().zip(&gradient).map(|(x, g)| g.abs() * (RESOLVED[0] + RESOLVED[1] * x.abs())).sum();
-    // Not-a-number is no size.
+    // NaN fails this comparison on purpose.
     let wanted = (MARGIN * h.abs()).max(resolved);
     let highest = highest(model, t, x, wanted / ROOM);
     if highest > 0.0 { wanted.min(ROOM * highest) } else { wanted }
@@ -315,7 +315,7 @@ fn highest(model: &dyn Predict, t: f64, x: &[f64], enough: f64) -> f64 {
             length *= 0.5;
             model.value(t, &next) > h
         });
-        // Not-a-number leads nowhere.
+        // NaN leads nowhere.
         if h >= enough || !climbs {
             break;
         }

@@ -1,17 +1,17 @@
 //! A sample of a filter with plans: what is promised, whether it is kept, and the input that has a plan behind it.
 
-use super::choice::{Chosen, Piece, Way, Wish};
+use super::choice::{ChoiceMemory, Chosen, Piece, Wish};
 use super::deviation::Deviation;
 use super::first::{First, SHORTER, least_factor};
 use super::planning::{AMPLE, Planning};
-use super::state::{Commitment, Promise};
-use super::{Assurance, Driver, JITTER, Plans, Standing};
+use super::state::{PlanState, Promise};
+use super::{Assurance, AssuranceStatus, Driver, JITTER, Plans};
 use crate::MAX_INPUTS;
 use crate::convergence::FixedTimeState;
 use crate::filter::integrator::Integrator;
 use crate::filter::rows::{BarrierSlot, End, Rows, Workspace};
 use crate::filter::{Infeasible, Phase, Status};
-use crate::plan::{Failure, ON_TIME, Plan, Planner, Sought, slopes};
+use crate::plan::{Failure, ON_TIME, Plan, Planner, SearchProgress, slopes};
 use crate::qp::Bounds;
 use crate::scalar::all_finite;
 
@@ -43,15 +43,15 @@ impl Decision<'_> {
         Planning { rows, integrator: *integrator, plans, bounds }
     }
 
-    fn before(&self) -> &Commitment {
+    fn before(&self) -> &PlanState {
         &self.rows.state.plan
     }
 
-    fn now(&self) -> &Commitment {
+    fn now(&self) -> &PlanState {
         &self.rows.workspace.next.plan
     }
 
-    fn next(&mut self) -> &mut Commitment {
+    fn next(&mut self) -> &mut PlanState {
         &mut self.rows.workspace.next.plan
     }
 
@@ -61,7 +61,7 @@ impl Decision<'_> {
         let Workspace { next, .. } = &mut self.rows.workspace;
         next.plan.clone_from(&self.rows.state.plan);
         // Not by the status: u_ref may be no number.
-        if next.plan.standing == Standing::Undecided && !next.is_armed(t, self.rows.arm_after) {
+        if next.plan.status == AssuranceStatus::Undecided && !next.is_armed(t, self.rows.arm_after) {
             (*self.assurance, *self.piece) = (Assurance::default(), Piece::ROWS);
             return;
         }
@@ -73,7 +73,7 @@ impl Decision<'_> {
             self.next().note(t, hold);
         }
         let mut is_regular = self.before().is_regular(t, hold);
-        if self.now().standing == Standing::Undecided && is_valid {
+        if self.now().status == AssuranceStatus::Undecided && is_valid {
             // What is made at a sample is made for it.
             is_regular |= self.decide(at, u);
         } else if self.before().is_followed() {
@@ -82,28 +82,29 @@ impl Decision<'_> {
         (self.assurance.driver, *self.piece, self.assurance.reason) = (Driver::Rows, Piece::ROWS, None);
         self.release();
         let is_over = self.now().promises.iter().flatten().all(|promise| promise.until <= t);
-        if self.now().standing == Standing::Assured && !is_over {
+        if self.now().status == AssuranceStatus::Assured && !is_over {
             self.assurance.driver = match is_valid {
                 true => self.choose(at, u_ref, u, is_regular),
                 false => self.go_on(at, u),
             };
-        } else if self.now().standing == Standing::Undecided && !self.now().plan.is_empty() {
+        } else if self.now().status == AssuranceStatus::Undecided && !self.now().plan.is_empty() {
             if self.before().in_time(t, hold) {
                 self.assurance.driver = self.go_on(at, u);
             } else {
                 self.next().plan = Plan::default();
             }
         }
-        if self.now().standing == Standing::Assured
+        if self.now().status == AssuranceStatus::Assured
             && is_valid
             && let Some(failure) = self.exposed(at, u)
         {
-            self.end(Standing::Withdrawn, Some(failure));
+            self.end(AssuranceStatus::Lost, Some(failure));
         }
-        let Commitment { standing, failure, plan, .. } = &self.rows.workspace.next.plan;
-        let is_assured = *standing == Standing::Assured;
-        (self.assurance.standing, self.assurance.failure) = (*standing, *failure);
-        self.assurance.until = is_assured.then_some(if is_over { f64::INFINITY } else { plan.witness.until });
+        let PlanState { status, failure, plan, .. } = &self.rows.workspace.next.plan;
+        let is_assured = *status == AssuranceStatus::Assured;
+        (self.assurance.status, self.assurance.failure) = (*status, *failure);
+        self.assurance.until =
+            is_assured.then_some(if is_over { f64::INFINITY } else { plan.backup_plan.until });
         self.assurance.reason = self.assurance.reason.filter(|_| is_assured);
         if is_assured || u != &rows[..u.len()] {
             self.report_on(&rows[..u.len()], u);
@@ -111,13 +112,14 @@ impl Decision<'_> {
     }
 
     /// Decides at the first sample: what is promised, and whether a plan keeps it. Where none does, those barriers that are
-    /// [to take a later deadline](Infeasible::Soonest) get the soonest for which there is one. Whether the plan was made here.
+    /// [to take a later deadline](Infeasible::Earliest) get the earliest for which there is one. Whether the plan was made
+    /// here.
     fn decide(&mut self, At { t, hold, x }: At<'_>, u: &[f64]) -> bool {
         let planning = self.planning();
         let search = |promises, shorter: &[f64]| planning.first(promises, (t, hold), x, u, shorter);
         let promises = planning.promises(t, x, |_| 1.0);
         let mut found = search(promises.clone(), &SHORTER).map(|first| (1.0, first));
-        let yields = |slot: &BarrierSlot| slot.promise.settings().infeasible == Infeasible::Soonest;
+        let yields = |slot: &BarrierSlot| slot.promise.settings().infeasible == Infeasible::Earliest;
         if found.is_err() && planning.rows.slots.iter().any(yields) {
             let promised =
                 |factor: f64| planning.promises(t, x, |slot| if yields(slot) { factor } else { 1.0 });
@@ -137,30 +139,30 @@ impl Decision<'_> {
                 let next = self.next();
                 (next.promises, next.plan) = (promises, plan);
                 next.deviation = Deviation::from(t, x);
-                next.way = Way::beside(&next.plan.witness);
+                next.memory = ChoiceMemory::beside(&next.plan.backup_plan);
                 self.prolong_next(t);
-                self.end(Standing::Assured, None);
+                self.end(AssuranceStatus::Assured, None);
                 self.postpone(t, hold, factor);
                 !is_old
             }
             Err(failure) => {
                 let next = self.next();
                 (next.promises, next.plan) = (promises, Plan::default());
-                self.end(Standing::Refused, Some(failure));
+                self.end(AssuranceStatus::Refused, Some(failure));
                 true
             }
         }
     }
 
     /// Starts the rows again at the first sample, with deadlines `factor` times as long where they yield. They keep more margin
-    /// than plans do, so that one stands behind their answer at the edge of a set too.
+    /// than plans do, so that one backs their answer at the edge of a set too.
     fn postpone(&mut self, t: f64, hold: f64, factor: f64) {
         let Rows { slots, state, workspace, .. } = &mut *self.rows;
         let Workspace { next, report, .. } = workspace;
         let states = next.barriers.iter_mut().zip(&state.barriers).zip(&next.plan.promises);
         for ((slot, ((state, before), promise)), b) in slots.iter().zip(states).zip(&mut report.barriers) {
             let settings = slot.promise.settings();
-            let later = factor > 1.0 && settings.infeasible == Infeasible::Soonest && b.h < 0.0;
+            let later = factor > 1.0 && settings.infeasible == Infeasible::Earliest && b.h < 0.0;
             state.least_margin = promise.map_or(0.0, |promise| AMPLE * promise.margin);
             if !slot.now.in_force || !(later || state.least_margin > settings.margin) {
                 continue;
@@ -202,15 +204,15 @@ impl Decision<'_> {
     /// Judges a promise that was followed: whether the sample came in time, and whether something was missed before it.
     fn judge(&mut self, At { t, hold, x }: At<'_>, is_valid: bool) {
         // What came to its end was kept until then.
-        let has_expired = self.before().standing == Standing::Expired;
-        let lost = |standing| if has_expired { Standing::Expired } else { standing };
+        let has_expired = self.before().status == AssuranceStatus::Expired;
+        let lost = |status| if has_expired { AssuranceStatus::Expired } else { status };
         match (self.before().in_time(t, hold), is_valid.then(|| self.missed(t, x)).flatten()) {
-            (true, None) if is_valid => self.end(Standing::Assured, None),
+            (true, None) if is_valid => self.end(AssuranceStatus::Assured, None),
             (true, None) => {}
-            (false, None) => self.end(lost(Standing::Irregular), None),
+            (false, None) => self.end(lost(AssuranceStatus::Irregular), None),
             // For good.
             (_, failure) => {
-                self.end(lost(Standing::Withdrawn), failure);
+                self.end(lost(AssuranceStatus::Lost), failure);
                 self.next().promises.fill(None);
             }
         }
@@ -219,11 +221,11 @@ impl Decision<'_> {
     /// What was or may have been missed until `t` since the last plan was followed, where the state is `x`: a set that is
     /// left, or a promise that began meanwhile.
     fn missed(&self, t: f64, x: &[f64]) -> Option<Failure> {
-        let Commitment { standing, sample, lost, .. } = self.before();
-        let seen = sample.map_or(t, |[last, held]| match standing {
-            Standing::Assured => last + held * (1.0 + JITTER),
+        let PlanState { status, sample, lost, .. } = self.before();
+        let seen = sample.map_or(t, |[last, held]| match status {
+            AssuranceStatus::Assured => last + held * (1.0 + JITTER),
             // There was a plan, but for a plant that differs.
-            Standing::Withdrawn if lost.is_none() => last + held * (1.0 + JITTER),
+            AssuranceStatus::Lost if lost.is_none() => last + held * (1.0 + JITTER),
             _ => last,
         });
         // A promise is about all times: what is measured again is not what was promised.
@@ -276,28 +278,28 @@ impl Decision<'_> {
         }
     }
 
-    fn end(&mut self, standing: Standing, failure: Option<Failure>) {
+    fn end(&mut self, status: AssuranceStatus, failure: Option<Failure>) {
         let next = self.next();
-        (next.standing, next.failure) = (standing, failure);
+        (next.status, next.failure) = (status, failure);
     }
 
-    /// Sets when the plan at hand is next tried to be prolonged.
+    /// Sets when the current plan is next tried to be prolonged.
     fn prolong_next(&mut self, t: f64) {
-        let at = self.planning().next_prolonging(t, self.now().plan.witness.until);
+        let at = self.planning().next_prolonging(t, self.now().plan.backup_plan.until);
         self.next().prolong_at = at;
     }
 
-    /// Looks for a plan that ends later than the one at hand, where it is time to.
+    /// Looks for a plan that ends later than the current one, where it is time to.
     fn prolong(&mut self, At { t, hold, x }: At<'_>, u: &[f64]) {
-        let Commitment { promises, plan, prolong_at, .. } = self.now();
+        let PlanState { promises, plan, prolong_at, .. } = self.now();
         if t < *prolong_at {
             return;
         }
         let longer = self
             .planning()
-            .planned(promises, (t, hold), u, |planner| planner.beyond(&plan.witness).search(t, x))
+            .planned(promises, (t, hold), u, |planner| planner.beyond(&plan.backup_plan).search(t, x))
             .ok()
-            .filter(|longer| longer.witness.until > plan.witness.until);
+            .filter(|longer| longer.backup_plan.until > plan.backup_plan.until);
         if let Some(longer) = longer {
             self.next().plan = longer;
         }
@@ -309,7 +311,7 @@ impl Decision<'_> {
     fn choose(&mut self, at: At<'_>, u_ref: &[f64], u: &mut [f64], is_regular: bool) -> Driver {
         self.prolong(at, u);
         let At { t, hold, x } = at;
-        let (planning, mut way) = (self.planning(), self.now().way.clone());
+        let (planning, mut memory) = (self.planning(), self.now().memory.clone());
         let (wish, wanted) = planning.wanted(hold, u_ref);
         let wish = Wish {
             wish: &wish[..u.len()],
@@ -319,33 +321,33 @@ impl Decision<'_> {
         };
         let found = planning.planned(&self.now().promises, (t, hold), u, |planner| {
             let planner = planner.irregular(!is_regular).hurried(planning.plans.search_budget);
-            let chosen = planning.chosen(&planner, (t, x), wish, &mut way)?;
+            let chosen = planning.chosen(&planner, (t, x), wish, &mut memory)?;
             Ok(planning.smoothed(&planner, (t, x), chosen, wish.reached))
         });
         match found {
             Ok(chosen) => {
-                let Chosen { driver, piece, share, witness, plan } = chosen;
-                way.note([self.before().share, share], driver);
-                u.copy_from_slice(&witness.inputs[0].1[..u.len()]);
-                self.assurance.reason = way.reason.filter(|_| *u != wanted[..u.len()]);
+                let Chosen { driver, piece, share, backup_plan, plan } = chosen;
+                memory.note([self.before().share, share], driver);
+                u.copy_from_slice(&backup_plan.inputs[0].1[..u.len()]);
+                self.assurance.reason = memory.reason.filter(|_| *u != wanted[..u.len()]);
                 *self.piece = piece;
                 let next = self.next();
-                (next.way, next.share) = (way, share);
-                (next.lost, next.regained) = (None, Sought::default());
+                (next.memory, next.share) = (memory, share);
+                (next.lost, next.regained) = (None, SearchProgress::default());
                 if let Some(plan) = plan {
                     next.plan = plan;
                 }
-                next.plan.witness = witness;
+                next.plan.backup_plan = backup_plan;
                 driver
             }
             Err(failure) => self.regain(at, failure, u, is_regular),
         }
     }
 
-    /// Looks for another plan where the one at hand keeps the promises no more, for the reason `failure`.
+    /// Looks for another plan where the current one keeps the promises no more, for the reason `failure`.
     fn regain(&mut self, at: At<'_>, failure: Failure, u: &mut [f64], is_regular: bool) -> Driver {
         let At { t, hold, x } = at;
-        // A plan that ends at rest is sought by a few steps a sample, where samples come as they are to.
+        // A plan that ends at an equilibrium is sought by a few steps a sample, where samples come as they are to.
         let is_spread = is_regular && !self.now().plan.is_finite();
         let (mut regained, mut goes_on) = (self.now().regained.clone(), false);
         let (planning, plan) = (self.planning(), &self.now().plan);
@@ -363,7 +365,7 @@ impl Decision<'_> {
                             goes_on = left;
                             failure
                         }),
-                    false => planner.beyond(&plan.witness).search(t, x),
+                    false => planner.beyond(&plan.backup_plan).search(t, x),
                 })
             }
         };
@@ -371,24 +373,24 @@ impl Decision<'_> {
         next.regained = regained;
         match found {
             Ok(plan) => {
-                u.copy_from_slice(&plan.witness.inputs[0].1[..u.len()]);
+                u.copy_from_slice(&plan.backup_plan.inputs[0].1[..u.len()]);
                 (next.plan, next.share) = (plan, 1.0);
-                (next.lost, next.regained) = (None, Sought::default());
+                (next.lost, next.regained) = (None, SearchProgress::default());
                 self.prolong_next(t);
                 *self.piece = Piece::PLAN;
                 Driver::Plan
             }
             Err(longer) => {
                 // A plan that has come to its end was kept.
-                let is_at_its_end = next.plan.witness.until <= t + 0.5 * hold;
-                let Commitment { standing, lost, .. } = *self.before();
-                let (standing, failure) = match is_regular {
-                    _ if lost.is_some() => (standing, failure),
-                    _ if is_at_its_end => (Standing::Expired, longer),
-                    true => (Standing::Withdrawn, failure),
-                    false => (Standing::Irregular, failure),
+                let is_at_its_end = next.plan.backup_plan.until <= t + 0.5 * hold;
+                let PlanState { status, lost, .. } = *self.before();
+                let (status, failure) = match is_regular {
+                    _ if lost.is_some() => (status, failure),
+                    _ if is_at_its_end => (AssuranceStatus::Expired, longer),
+                    true => (AssuranceStatus::Lost, failure),
+                    false => (AssuranceStatus::Irregular, failure),
                 };
-                self.end(standing, Some(failure));
+                self.end(status, Some(failure));
                 // Ever more seldom, since a search is long.
                 if lost.is_none_or(|[_, next]| t >= next) {
                     let since = lost.map_or(t, |[since, _]| since);
@@ -417,9 +419,9 @@ impl Decision<'_> {
     /// Goes on with the plan as it is, where nobody knows where the plant is.
     fn go_on(&mut self, At { t, hold, .. }: At<'_>, u: &mut [f64]) -> Driver {
         let plan = &self.now().plan;
-        let inputs = &plan.witness.inputs;
+        let inputs = &plan.backup_plan.inputs;
         let next = inputs.iter().find(|(end, _)| *end > t + 0.5 * hold);
-        // Past its end, a rest that only feedback holds is left.
+        // Past its end, an equilibrium that only feedback holds is left.
         let is_over = next.is_none() && !plan.stays();
         if let Some((_, input)) = next.or(inputs.last()) {
             for (i, u) in u.iter_mut().enumerate() {
@@ -427,10 +429,10 @@ impl Decision<'_> {
             }
         }
         let is_lost = is_over || !self.before().is_regular(t, hold);
-        if is_lost && self.now().standing == Standing::Undecided {
+        if is_lost && self.now().status == AssuranceStatus::Undecided {
             self.next().plan = Plan::default();
         } else if is_lost {
-            self.end(if is_over { Standing::Withdrawn } else { Standing::Irregular }, None);
+            self.end(if is_over { AssuranceStatus::Lost } else { AssuranceStatus::Irregular }, None);
         }
         Driver::Plan
     }

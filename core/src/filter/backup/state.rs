@@ -2,11 +2,11 @@
 
 use alloc::vec::Vec;
 
-use super::choice::Way;
+use super::choice::ChoiceMemory;
 use super::deviation::Deviation;
-use super::{JITTER, Standing};
+use super::{AssuranceStatus, JITTER};
 use crate::error::{Error, ErrorKind, length};
-use crate::plan::{Failure, ON_TIME, Plan, Sought, Witness};
+use crate::plan::{BackupPlan, Failure, ON_TIME, Plan, SearchProgress};
 
 /// The largest round-off of a time, as a part of the period.
 const ROUND_OFF: f64 = 1e-2;
@@ -19,10 +19,10 @@ const ALIKE: u32 = 8;
 /// The part of a [`FilterState`](crate::filter::FilterState) that is of plans: the promises and the plan that keeps them.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Commitment {
-    /// Where the promise stands.
-    pub standing: Standing,
-    /// Why there is no plan, where the promise was refused or withdrawn.
+pub struct PlanState {
+    /// Status of the guarantee.
+    pub status: AssuranceStatus,
+    /// Why there is no plan, where the promise was refused or lost.
     pub(super) failure: Option<Failure>,
     /// One of each barrier; `None` where nothing is promised, or no more.
     pub(super) promises: Vec<Option<Promise>>,
@@ -32,12 +32,12 @@ pub struct Commitment {
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub(super) lost: Option<[f64; 2]>,
     /// The search for another one.
-    pub(super) regained: Sought,
+    pub(super) regained: SearchProgress,
     /// The part of the last input that was the plan's, beside the answer of the rows; 0 where no plan was needed.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub(super) share: f64,
     /// What is comfortable, and when a plan is next sought behind u_ref.
-    pub(super) way: Way,
+    pub(super) memory: ChoiceMemory,
     /// The time in s at which a plan that ends is next tried to be prolonged.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub(super) prolong_at: f64,
@@ -52,13 +52,13 @@ pub struct Commitment {
     pub(super) deviation: Deviation,
 }
 
-impl Commitment {
-    /// Whether the promise stands, or may be taken up again.
+impl PlanState {
+    /// Whether the guarantee holds, or may be regained.
     pub(super) fn is_followed(&self) -> bool {
-        match self.standing {
-            Standing::Assured => true,
-            Standing::Undecided | Standing::Refused => false,
-            Standing::Withdrawn | Standing::Irregular | Standing::Expired => {
+        match self.status {
+            AssuranceStatus::Assured => true,
+            AssuranceStatus::Undecided | AssuranceStatus::Refused => false,
+            AssuranceStatus::Lost | AssuranceStatus::Irregular | AssuranceStatus::Expired => {
                 self.promises.iter().any(Option::is_some)
             }
         }
@@ -78,11 +78,11 @@ impl Commitment {
 
     /// Forgets what was promised. A plan that was followed for it is kept to go on with, and when the last sample was.
     pub(crate) fn rearm(&mut self) {
-        let Self { standing, promises, plan, sample, interval, alike, .. } = core::mem::take(self);
+        let Self { status, promises, plan, sample, interval, alike, .. } = core::mem::take(self);
         let is_over = |[t, _]: [f64; 2]| promises.iter().flatten().all(|promise| promise.until <= t);
-        let is_followed = match standing {
-            Standing::Assured => !sample.is_none_or(is_over),
-            _ => standing == Standing::Undecided,
+        let is_followed = match status {
+            AssuranceStatus::Assured => !sample.is_none_or(is_over),
+            _ => status == AssuranceStatus::Undecided,
         };
         if is_followed {
             (self.plan, self.sample) = (plan, sample);
@@ -91,8 +91,8 @@ impl Commitment {
     }
 
     /// The plan that keeps the promises, where there is one.
-    pub(super) fn witness(&self) -> Option<&Witness> {
-        (self.standing == Standing::Assured).then_some(&self.plan.witness)
+    pub(super) fn backup_plan(&self) -> Option<&BackupPlan> {
+        (self.status == AssuranceStatus::Assured).then_some(&self.plan.backup_plan)
     }
 
     /// How long in s the input of the last sample was to be held, if there was one.
@@ -102,14 +102,14 @@ impl Commitment {
 
     /// As [`Filter::usual_hold`](crate::filter::Filter::usual_hold), for plans of this `period`.
     pub(super) fn usual_hold(&self, t: f64, period: f64) -> f64 {
-        let Commitment { standing, sample, alike, interval, .. } = *self;
+        let PlanState { status, sample, alike, interval, .. } = *self;
         let Some([last, held]) = sample else { return period };
         let passed = t - last;
         let is_same = (passed - held).abs() <= ON_TIME * held + 2.0 * f64::EPSILON * t.abs();
         let is_usual = passed < QUICKER * held && alike + 1 >= ALIKE && is_like(passed, interval);
-        match standing {
+        match status {
             _ if is_same => held,
-            Standing::Undecided => period,
+            AssuranceStatus::Undecided => period,
             _ if is_like(passed, held) => held.max((1.0 + HEADROOM) * passed),
             _ if passed > held && passed.is_finite() || passed > 0.0 && is_usual => passed,
             _ => held,
@@ -122,16 +122,16 @@ impl Commitment {
         let Some([last, held]) = self.sample else { return false };
         let round_off = 2.0 * f64::EPSILON * t.abs();
         let late = JITTER * held + round_off;
-        // Not-a-number is out of time.
+        // NaN counts as out of time.
         last <= t && t <= last + held + late && round_off <= ROUND_OFF * hold.min(held)
     }
 
     /// Whether the sample at `t` is one for which the plan was made.
     pub(super) fn is_regular(&self, t: f64, hold: f64) -> bool {
-        let Commitment { plan, sample, .. } = self;
+        let PlanState { plan, sample, .. } = self;
         sample.is_some_and(|[last, held]| {
             let tolerance = ON_TIME * held + 2.0 * f64::EPSILON * t.abs();
-            plan.witness.is_even
+            plan.backup_plan.is_uniform
                 && (t == last || t >= last + held - tolerance)
                 && (hold - held).abs() <= ON_TIME * held
         })
@@ -150,51 +150,51 @@ impl Commitment {
         is_fresh: bool,
         horizon: Option<f64>,
     ) -> Result<(), Error> {
-        let Commitment {
-            standing,
+        let PlanState {
+            status,
             promises,
             plan,
             lost,
             regained,
             share,
-            way,
+            memory,
             prolong_at,
             sample,
             interval,
             ..
         } = self;
         let refuse = |field: &str, message: &str| Err(Error::new(ErrorKind::Dimension, field, message));
-        if *standing != Standing::Undecided {
+        if *status != AssuranceStatus::Undecided {
             length("promises", promises.len(), barriers)?;
         }
-        if *standing == Standing::Undecided && !is_fresh {
-            return refuse("standing", "is undecided, beside samples that were decided on");
+        if *status == AssuranceStatus::Undecided && !is_fresh {
+            return refuse("status", "is undecided, beside samples that were decided on");
         }
-        if self.is_followed() || *standing == Standing::Undecided && !plan.is_empty() {
+        if self.is_followed() || *status == AssuranceStatus::Undecided && !plan.is_empty() {
             if let Some(flaw) = plan.flaw(dims) {
                 return refuse("plan", flaw);
             }
             if !(0.0..=1.0).contains(share) {
-                return refuse("share", "is no part, must be 0 to 1");
+                return refuse("share", "is not a part, must be 0 to 1");
             }
-            if way.is_flawed() || regained.is_flawed() {
-                return refuse("way", "is none of a filter, or not finite");
+            if memory.is_flawed() || regained.is_flawed() {
+                return refuse("memory", "is not of a filter, or not finite");
             }
             if prolong_at.is_nan() || plan.is_finite() && horizon.is_none() {
-                return refuse("plan", "ends without a rest, which needs a horizon and a time to prolong it");
+                return refuse("plan", "ends in motion, which needs a horizon and a time to extend it");
             }
             let is_promise = |p: &Promise| {
                 let is_timed = p.from.is_finite() && p.firm.is_finite() && !p.until.is_nan();
                 is_timed && p.margin >= 0.0 && p.reserve >= 0.0
             };
             if !promises.iter().flatten().all(is_promise) {
-                return refuse("promises", "have a time or a margin that is no number");
+                return refuse("promises", "have a time or a margin that is not a number");
             }
             if !sample.is_some_and(|[t, hold]| t.is_finite() && hold.is_finite() && hold > 0.0) {
                 return refuse("sample", "has no time, must have one beside a plan");
             }
             if self.is_followed() && !self.deviation.fits(dims[0]) {
-                return refuse("deviation", "is none of a plant with as many states");
+                return refuse("deviation", "is not of a plant with as many states");
             }
             if !interval.is_finite() {
                 return refuse("interval", "is not finite");

@@ -8,7 +8,7 @@ use crate::plan::Failure;
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Driver {
-    /// u_ref, with a comfortable plan behind it: the one at hand, that moved in time, or another.
+    /// u_ref, with a comfortable plan behind it: the current one, that moved in time, or another.
     Reference,
     /// The rows of the filter inside, with a plan behind their answer; or the rows alone, where there is no promise.
     #[default]
@@ -29,28 +29,28 @@ pub enum Driver {
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 #[repr(u8)]
-pub enum Standing {
+pub enum AssuranceStatus {
     /// No sample yet.
     #[default]
     Undecided = 0,
-    /// Every promise is kept: there is a witness.
+    /// Every promise is kept: there is a backup plan.
     Assured = 1,
     /// Refused at the first sample: no plan was found. The filter goes on by its rows, without promise.
     Refused = 2,
-    /// Was assured, and is not now: the plant is not where the model led. Until something promised is missed the promise is
-    /// taken up again at the first sample from which a plan keeps it.
-    Withdrawn = 3,
+    /// Was assured, and is not now: the plant is not where the model predicted. Until something promised is missed the
+    /// guarantee is regained at the first sample from which a plan keeps it.
+    Lost = 3,
     /// Was assured, and is not now: a sample came later than the hold of the one before, or earlier and no plan was found
-    /// from there. It is taken up again as one that is withdrawn, after a late sample at the next one in time.
+    /// from there. It is regained as one that was lost, after a late sample at the next one in time.
     Irregular = 4,
-    /// Was assured until a time, which has come: no plan was found beyond it. It is taken up again as one that is withdrawn.
+    /// Was assured until a time, which has come: no plan was found beyond it. It is regained as one that was lost.
     Expired = 5,
 }
 
-impl Standing {
-    /// Every standing, in the order of its number.
+impl AssuranceStatus {
+    /// Every status, in the order of its number.
     pub const ALL: [Self; 6] =
-        [Self::Undecided, Self::Assured, Self::Refused, Self::Withdrawn, Self::Irregular, Self::Expired];
+        [Self::Undecided, Self::Assured, Self::Refused, Self::Lost, Self::Irregular, Self::Expired];
 
     /// Its name, as the FMU's enumeration has it.
     pub fn name(self) -> &'static str {
@@ -67,7 +67,7 @@ impl Standing {
             Self::Undecided => ("undecided", "no step with a valid state yet, or not armed"),
             Self::Assured => ("assured", "a plan keeps every promise, whatever u_ref is"),
             Self::Refused => ("refused", "no plan was found at the start: nothing is promised"),
-            Self::Withdrawn => ("withdrawn", "was assured: the plant is not where the model led"),
+            Self::Lost => ("lost", "was assured: the plant is not where the model predicted"),
             Self::Irregular => {
                 ("irregular", "was assured: a step came late, or early without a plan from there")
             }
@@ -93,11 +93,11 @@ pub struct Reason {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Assurance {
-    /// Where the promise stands.
-    pub standing: Standing,
+    /// Status of the guarantee.
+    pub status: AssuranceStatus,
     /// Who chose the input.
     pub driver: Driver,
-    /// Why there is no plan, where the promise was refused, withdrawn, or has come to its end.
+    /// Why there is no plan, where the promise was refused or lost, or has come to its end.
     pub failure: Option<Failure>,
     /// The time in s until which every promise is kept, infinite for ever; `None` where nothing is assured. Once given, it
     /// never goes back.
@@ -111,6 +111,6 @@ pub struct Assurance {
 impl Assurance {
     /// Whether every promise is kept, whatever u_ref is.
     pub fn is_assured(&self) -> bool {
-        self.standing == Standing::Assured
+        self.status == AssuranceStatus::Assured
     }
 }

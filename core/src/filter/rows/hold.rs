@@ -2,7 +2,7 @@
 //!
 //! Let η(σ) = h(t + σ) along the model under the held input, less what disturbances and errors may take off. The model walks
 //! through the hold in parts, and η and η̇ are read between them. From instants σ_1 < σ_2 < σ_3 the cubic through the outer two
-//! foresees η and η̇ at the middle one. Its error there bounds what the cubics of the two halves leave open: less than an
+//! predicts η and η̇ at the middle one. Its error there bounds what the cubics of the two halves leave open: less than an
 //! eighth of it where η is smooth (their error is max|η⁗| σ⁴/384 on a length σ), twice it at a kink. The walk is repeated in
 //! twice as many parts. It ends when that bound, and what two walks differ by, decide whether h ≥ 0.
 //!
@@ -58,7 +58,7 @@ pub(super) struct Lowest {
 
 impl Lowest {
     pub(super) fn or(self, other: Self) -> Self {
-        // Not-a-number counts as lowest.
+        // NaN counts as lowest.
         if self.h < other.h || self.h.is_nan() { self } else { other }
     }
 }
@@ -126,7 +126,7 @@ impl Hold<'_> {
             self.walk(source, [from, to], scratch, &mut fine[..=2 * parts]);
             let mut differ = 0.0;
             for (a, b) in coarse[..=parts].iter().zip(fine.iter().step_by(2)) {
-                // Not `max`, which would drop not-a-number.
+                // Not `max`, which would drop NaN.
                 let by = (a.h - b.h).abs() + (to - from) / parts as f64 * (a.slope - b.slope).abs();
                 differ = if by <= differ { differ } else { by };
             }
@@ -210,9 +210,9 @@ fn dips(&[a, middle, b]: &[Node; 3]) -> (Lowest, f64) {
     let (left, right, rise) = (a.slope * length, b.slope * length, b.h - a.h);
     // a.h + left z + c z² + d z³.
     let (c, d) = (3.0 * rise - 2.0 * left - right, left + right - 2.0 * rise);
-    let foreseen = a.h + z * (left + z * (c + z * d));
+    let forecast = a.h + z * (left + z * (c + z * d));
     let slope = (left + z * (2.0 * c + 3.0 * z * d)) / length;
-    let off = (middle.h - foreseen).abs() + length / 4.0 * (middle.slope - slope).abs();
+    let off = (middle.h - forecast).abs() + length / 4.0 * (middle.slope - slope).abs();
     (dip(a, middle).or(dip(middle, b)), off)
 }
 

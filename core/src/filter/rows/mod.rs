@@ -22,7 +22,7 @@ use crate::qp::{self, Bounds, Enforcement, Row};
 use crate::reach;
 pub(super) use errors::MeasurementErrors;
 pub(super) use errors::{check as check_errors, check_all as check_all_errors};
-pub use search::Bend;
+pub use search::Curvature;
 use search::Requirement;
 pub(super) use search::Scratch;
 pub use sensitivity::{BarrierDerivative, NoDerivative, SampleDerivative};
@@ -67,7 +67,7 @@ pub(super) struct Rows {
     pub(super) arm_after: f64,
     /// The time in s for which the next input will be held, where it is known.
     pub(super) expected: Option<f64>,
-    /// Whether a plan stands behind the next step, so that rows need not be met.
+    /// Whether a plan backs the next step, so that rows need not be met.
     pub(super) is_backed: bool,
     /// The memory of the filter, of which the rows use their part.
     pub(super) state: FilterState,

@@ -13,7 +13,7 @@ use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 /// The part of h that must be left for it to be far from its edge.
 const CLEAR: f64 = 0.5;
 
-/// The course of h until the next sample, as the derivatives at a sample foresee it.
+/// The evolution of h until the next sample, as the derivatives at a sample predict it.
 #[derive(Clone, Copy)]
 pub(super) struct Outlook<'a> {
     pub(super) n: usize,
@@ -43,7 +43,7 @@ pub(super) fn span(promise: &FixedTimeState, t: f64, [hold, long]: [f64; 2]) -> 
 impl Outlook<'_> {
     /// h⁽ʲ⁾ `s` seconds later by the Taylor polynomial of order `n` of h, with h⁽ⁿ⁾ = `highest`.
     #[inline(always)]
-    fn foreseen(&self, n: usize, j: usize, highest: f64, s: f64) -> f64 {
+    fn forecast(&self, n: usize, j: usize, highest: f64, s: f64) -> f64 {
         // Horner's scheme.
         (j..n).rev().fold(highest, |sum, k| self.drift[k] + sum * s / (k + 1 - j) as f64)
     }
@@ -68,7 +68,7 @@ impl Outlook<'_> {
     pub(super) fn row_at(&self, requirement: &Requirement, normal: &[f64; MAX_INPUTS]) -> Row {
         let s = requirement.ahead;
         let power = (1..=self.n).fold(1.0, |power, k| power * s / k as f64);
-        let floor = (requirement.bound.floor - self.foreseen(self.n, 0, self.drift[self.n], s)) / power;
+        let floor = (requirement.bound.floor - self.forecast(self.n, 0, self.drift[self.n], s)) / power;
         Row { normal: *normal, floor }
     }
 
@@ -117,14 +117,14 @@ impl Outlook<'_> {
         let lowest = held
             .lowest(from, hold, scratch)
             .unwrap_or_else(|| self.lowest_of_polynomial(highest, from, hold));
-        // Not-a-number keeps no promise.
+        // NaN keeps no promise.
         (lowest.h < -ROUND_OFF * size || lowest.h.is_nan()).then_some(lowest)
     }
 
-    /// Whether the derivatives at the end of the hold, where h is far from its edge, are those foreseen: for sources without
-    /// enclosures. So are they where known ones before are, as far as what they are off by grows with the power n + 1 of the
-    /// time. With n = 1 a set that moves faster than the samples shows in no derivative that is known here; a turn by
-    /// radians shows where the hold ends.
+    /// Whether the derivatives at the end of the hold, where h is far from its edge, are those predicted: for sources
+    /// without enclosures. So are they where known ones before are, as far as what they are off by grows with the power n +
+    /// 1 of the time. With n = 1 a set that moves faster than the samples shows in no derivative that is known here; a turn
+    /// by radians shows where the hold ends.
     #[inline(always)]
     fn agrees<const N: usize>(&self, held: &Hold, highest: f64, h: f64, hold: f64) -> bool {
         if N == 1 {
@@ -141,13 +141,13 @@ impl Outlook<'_> {
         held.derivatives(hold).is_none_or(|end| self.is_near::<N>(&end[..=N], hold, highest, allowed))
     }
 
-    /// Whether `derivatives` of h are those foreseen `s` seconds later, but for what moves h by so much `allowed`.
+    /// Whether `derivatives` of h are those predicted `s` seconds later, but for what moves h by so much `allowed`.
     #[inline(always)]
     fn is_near<const N: usize>(&self, derivatives: &[f64], s: f64, highest: f64, allowed: f64) -> bool {
         let mut power = 1.0;
         derivatives.iter().enumerate().all(|(k, h)| {
             power *= if k == 0 { 1.0 } else { s / k as f64 };
-            power * (h - self.foreseen(N, k, highest, s)).abs() <= allowed
+            power * (h - self.forecast(N, k, highest, s)).abs() <= allowed
         })
     }
 
@@ -156,7 +156,7 @@ impl Outlook<'_> {
         const INSTANTS: u32 = 16;
         let at = |i: u32| from + (to - from) * f64::from(i) / f64::from(INSTANTS);
         (0..=INSTANTS)
-            .map(|i| Lowest { h: self.foreseen(self.n, 0, highest, at(i)) - self.short(at(i)), at: at(i) })
+            .map(|i| Lowest { h: self.forecast(self.n, 0, highest, at(i)) - self.short(at(i)), at: at(i) })
             .fold(Lowest { h: f64::INFINITY, at: from }, Lowest::or)
     }
 

@@ -84,7 +84,7 @@ impl Rows {
         let period = self.sampling.period(&self.state, t, self.first_period, self.expected);
         let since = self.state.time.map_or(0.0, |last| (t - last).max(0.0));
         let hold = period.unwrap_or(since).max(self.period_max);
-        let told = self.expected.is_some() || self.period_max > 0.0;
+        let reported = self.expected.is_some() || self.period_max > 0.0;
         Moment {
             t,
             delay: self.delay,
@@ -93,7 +93,7 @@ impl Rows {
             u_ref,
             period,
             hold,
-            long: self.sampling.longest(hold, told),
+            long: self.sampling.longest(hold, reported),
             measures: matches!(self.sampling, Sampling::Measured { .. }),
             bounded: self.bounded,
         }
@@ -223,7 +223,7 @@ impl Rows {
                 errors: &self.errors,
                 widens: self.state.barriers.iter().all(widens),
                 is_backed: self.is_backed,
-                bend: self.state.bend_before(moment.t).as_ref(),
+                curvature: self.state.curvature_before(moment.t).as_ref(),
             };
             let last = self.state.time.map(|_| &self.state.input[..u.len()]);
             if let Some(solution) = problem.solve(&mut rows[..requirements.len()], last, search, qp, u) {
@@ -287,7 +287,7 @@ impl Rows {
             next.period = moment.period;
         }
         next.time = Some(moment.t);
-        next.bends = [*self.state.bend_before(moment.t), search.bend];
+        next.curvatures = [*self.state.curvature_before(moment.t), search.curvature];
         next.input[..u.len()].copy_from_slice(u);
         report.solver = solution.solver;
         report.iterations = solution.iterations;

@@ -4,10 +4,10 @@
 //! is not, because the state at the end of the period depends on u through the plant. Newton's method on the rows
 //! solves it: linearise at the present guess, solve the QP, and go towards its answer. Each step goes as far as
 //! the violation of the rows that the QP does not give up decreases, halving the way. Only rows that are active or
-//! violated are linearised anew. The others keep their last linearisation, at first the pointwise row. All are
+//! violated are linearised again. The others keep their last linearisation, at first the pointwise row. All are
 //! evaluated where the search ends.
 //!
-//! Mostly one row is active and all but affine, and its point nearest to u_ref is found at once (`bent_row`). With several, a
+//! Mostly one row is active and all but affine, and its point nearest to u_ref is found at once (`curved_row`). With several, a
 //! few corrections from u_ref find the answer (`correction`). Where they do not, there
 //! are two guesses to start from: the answer of the pointwise rows, and the input of the step before. The
 //! better result is taken, by the number of rows given up, then by violation, then by distance from u_ref. The second
@@ -18,7 +18,7 @@
 //! as equal, so a sample taken again gives the same bits.
 //!
 //! An answer is settled where its steps contracted like that, or where both guesses end at it. Two answers are not
-//! settled. One is far out against u_ref, where the plant turns and other answers exist. The other has room aside:
+//! settled. One is far out against u_ref, where the plant turns and other answers exist. The other has room sideways:
 //! the row that u_ref violates leaves more room there than the way costs. A vehicle that brakes straight ahead where
 //! it could turn to either side is at rest between two such answers. So a master that takes a step again, or cuts it
 //! in two, gets the same input. From any answer that is not settled, above all from one that does not meet the rows,
@@ -28,11 +28,11 @@
 //! Violations are round-off where they are small against the terms that h and its derivatives are made of. They are not
 //! compared with what is left of these: on the boundary of 10 − p ≥ 0 that is round-off itself.
 
-mod bent_row;
 mod correction;
+mod curved_row;
 mod wide;
 
-pub use bent_row::Bend;
+pub use curved_row::Curvature;
 
 use super::errors::{MeasurementErrors, Uncertainty};
 use super::shared::SharedPlants;
@@ -55,11 +55,11 @@ const ROUND_OFF: f64 = 1e-12;
 const SAME: f64 = 1e-6;
 /// Distance from u_ref beyond which an answer is not settled, over the size of u_ref and the last input, or 1.
 const FAR: f64 = 8.0;
-/// Distance aside of an answer at which a nearer one is looked for, as a part of its distance from u_ref.
-const ASIDE: f64 = 0.5;
+/// Distance sideways of an answer at which a nearer one is looked for, as a part of its distance from u_ref.
+const SIDEWAYS: f64 = 0.5;
 /// Linearisations per guess, and halvings of the way to the answer of one of them.
 const PATIENT: [u32; 2] = [12, 8];
-/// The same where a plan stands behind the step: what is found with more of them is seldom better than the plan.
+/// The same where a plan backs the step: what is found with more of them is seldom better than the plan.
 const BACKED: [u32; 2] = [4, 2];
 /// The part of the foretold decrease that must come true.
 const SUFFICIENT: f64 = 0.3;
@@ -116,10 +116,10 @@ pub(crate) struct PeriodProblem<'a> {
     pub(crate) errors: &'a MeasurementErrors,
     /// Whether to look far around for an input where the pointwise rows cannot be met either.
     pub(crate) widens: bool,
-    /// Whether a plan stands behind the step, so that rows need not be met.
+    /// Whether a plan backs the step, so that rows need not be met.
     pub(crate) is_backed: bool,
-    /// How the only active row of the sample before bent.
-    pub(crate) bend: Option<&'a Bend>,
+    /// How the only active row of the sample before was curved.
+    pub(crate) curvature: Option<&'a Curvature>,
 }
 
 /// Scratch memory of the search; its contents change no bit of the next one.
@@ -127,19 +127,19 @@ pub(crate) struct Scratch {
     violations: [f64; MAX_ROWS],
     pub(crate) evaluations: Evaluations,
     predicted: Predicted,
-    /// How the only active row of the last answer bends, where the search knows it.
-    pub(crate) bend: Option<Bend>,
+    /// How the only active row of the last answer curves, where the search knows it.
+    pub(crate) curvature: Option<Curvature>,
 }
 
 impl Scratch {
     pub(crate) fn new(plants: SharedPlants) -> Self {
         let evaluations = Evaluations { ahead: Ahead::ZERO, plants };
-        Self { violations: [0.0; MAX_ROWS], evaluations, predicted: Predicted::NOTHING, bend: None }
+        Self { violations: [0.0; MAX_ROWS], evaluations, predicted: Predicted::NOTHING, curvature: None }
     }
 
     /// Forgets the last answer.
     pub(crate) fn clear(&mut self) {
-        (self.predicted.rows, self.bend) = (RowSet::EMPTY, None);
+        (self.predicted.rows, self.curvature) = (RowSet::EMPTY, None);
     }
 
     /// h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ at the instant of requirement `i` under `u`; the rest means nothing. `None` where the search has not
@@ -180,7 +180,7 @@ struct Linearised<'a> {
     violations: &'a mut [f64; MAX_ROWS],
     evaluations: &'a mut Evaluations,
     predicted: &'a mut Predicted,
-    bend: &'a mut Option<Bend>,
+    curvature: &'a mut Option<Curvature>,
 }
 
 impl Linearised<'_> {
@@ -270,9 +270,9 @@ impl PeriodProblem<'_> {
         u: &mut [f64],
     ) -> Option<Solution> {
         let m = u.len();
-        let Scratch { violations, evaluations, predicted, bend } = scratch;
-        let mut at = Linearised { rows, violations, evaluations, predicted, bend };
-        if let Some(solution) = self.bent_row(u, last, &mut at, qp) {
+        let Scratch { violations, evaluations, predicted, curvature } = scratch;
+        let mut at = Linearised { rows, violations, evaluations, predicted, curvature };
+        if let Some(solution) = self.curved_row(u, last, &mut at, qp) {
             return Some(solution);
         }
         for (i, row) in at.rows.iter_mut().enumerate() {
@@ -303,7 +303,7 @@ impl PeriodProblem<'_> {
         let known = self.u_ref.iter().chain(last.into_iter().flatten());
         let size = known.fold(1.0, |s: f64, v| s.max(v.abs()));
         settled &= best.distance <= FAR * size;
-        settled = settled && !against.is_some_and(|i| self.is_nearer_aside(u, (i, false), &mut at));
+        settled = settled && !against.is_some_and(|i| self.is_nearer_sideways(u, (i, false), &mut at));
         // Look far around where the answer is in doubt.
         let widens =
             !self.is_backed && (self.widens || best.is_met(self.soft()) || first.outcome == Outcome::Optimal);
@@ -409,18 +409,18 @@ impl PeriodProblem<'_> {
         norm(u.iter().zip(&self.u_ref[..u.len()]).map(|(v, r)| v - r))
     }
 
-    /// Linearises the sampled rows of `anew` at `u`, and evaluates the models of the others there.
+    /// Linearises the sampled rows of `again` at `u`, and evaluates the models of the others there.
     /// `None` where there is no finite prediction.
-    fn linearise(&self, u: &[f64], anew: RowSet, at: &mut Linearised) -> Option<()> {
+    fn linearise(&self, u: &[f64], again: RowSet, at: &mut Linearised) -> Option<()> {
         // As in `solve`.
         match u {
-            [a, b] => self.linearise_for(&[*a, *b], anew, at),
-            _ => self.linearise_for(u, anew, at),
+            [a, b] => self.linearise_for(&[*a, *b], again, at),
+            _ => self.linearise_for(u, again, at),
         }
     }
 
     #[inline(always)]
-    fn linearise_for(&self, u: &[f64], anew: RowSet, at: &mut Linearised) -> Option<()> {
+    fn linearise_for(&self, u: &[f64], again: RowSet, at: &mut Linearised) -> Option<()> {
         let Linearised { rows, violations, evaluations, predicted, .. } = at;
         if predicted.input[..u.len()] != *u {
             predicted.rows = RowSet::EMPTY;
@@ -431,7 +431,7 @@ impl PeriodProblem<'_> {
             *violation = 0.0;
             if requirement.bound.is_zero() {
                 *row = Row::ZERO;
-            } else if anew.contains(i) {
+            } else if again.contains(i) {
                 *violation = self.linearised(requirement, u, evaluations, row)?;
                 predicted.rows.insert(i);
                 let n = self.slots[requirement.barrier].degree();
@@ -554,18 +554,18 @@ impl PeriodProblem<'_> {
         if size.is_finite() { size } else { 0.0 }
     }
 
-    /// Whether row `i`, seen from half the way aside, allows an answer that is nearer to u_ref than `u`. Where the rows are all
-    /// but affine, or miss little of a quadratic that is curved inwards, the others have to allow it too: else the plant may
-    /// turn so far that they do elsewhere.
+    /// Whether row `i`, seen from half the way sideways, allows an answer that is nearer to u_ref than `u`. Where the rows
+    /// are all but affine, or miss little of a quadratic that is curved inwards, the others have to allow it too: else the
+    /// plant may turn so far that they do elsewhere.
     #[inline(always)]
-    fn is_nearer_aside(&self, u: &[f64], (i, is_regular): (usize, bool), at: &mut Linearised) -> bool {
-        self.look_aside(u, (i, is_regular), at, |_, _| {})
+    fn is_nearer_sideways(&self, u: &[f64], (i, is_regular): (usize, bool), at: &mut Linearised) -> bool {
+        self.look_sideways(u, (i, is_regular), at, |_, _| {})
     }
 
-    /// [`Self::is_nearer_aside`]. Tells `seen` of each way aside, as far as it went without a nearer answer, and the sum of
-    /// the row's slacks there and on the opposite side.
+    /// [`Self::is_nearer_sideways`]. Tells `seen` of each direction sideways, as far as it went without a nearer answer,
+    /// and the sum of the row's slacks there and on the opposite side.
     #[inline(always)]
-    fn look_aside(
+    fn look_sideways(
         &self,
         u: &[f64],
         (i, is_regular): (usize, bool),
@@ -574,11 +574,11 @@ impl PeriodProblem<'_> {
     ) -> bool {
         let (m, far, u_ref) = (u.len(), self.distance(u), &self.u_ref[..u.len()]);
         let normal = norm(at.rows[i].normal[..m].iter().copied());
-        // The axis that is most along u − u_ref adds no direction aside to those of the others.
+        // The axis that is most along u − u_ref adds no direction sideways to those of the others.
         let way = |i: usize| (u[i] - u_ref[i]).abs();
         let main = (0..m).fold(0, |main, i| if way(i) > way(main) { i } else { main });
         let mut direction = [0.0; MAX_INPUTS];
-        let mut aside = [0.0; MAX_INPUTS];
+        let mut sideways = [0.0; MAX_INPUTS];
         for axis in (0..m).filter(|axis| *axis != main) {
             // The axis without its part along u − u_ref.
             let along = (u[axis] - u_ref[axis]) / far;
@@ -586,22 +586,22 @@ impl PeriodProblem<'_> {
                 *d = -along * (u[j] - u_ref[j]) / far;
             }
             direction[axis] += 1.0;
-            let length = ASIDE * far / norm(direction[..m].iter().copied());
+            let length = SIDEWAYS * far / norm(direction[..m].iter().copied());
             let mut slacks = 0.0;
             for way in [length, -length] {
                 for j in 0..m {
-                    aside[j] = self.bounds.clamp(j, u[j] + way * direction[j]);
+                    sideways[j] = self.bounds.clamp(j, u[j] + way * direction[j]);
                 }
-                let aside = &aside[..m];
-                let nearer = (self.distance(aside) - far) * normal;
-                // Not-a-number where it is not known, as on a way that a bound cuts short.
-                let slack = self.slack(&self.requirements[i], aside, at.evaluations);
+                let sideways = &sideways[..m];
+                let nearer = (self.distance(sideways) - far) * normal;
+                // NaN where it is not known, as on a way that a bound cuts short.
+                let slack = self.slack(&self.requirements[i], sideways, at.evaluations);
                 if slack.is_some_and(|s| s > nearer)
-                    && (!is_regular || self.others_leave_room(aside, i, far, at))
+                    && (!is_regular || self.others_leave_room(sideways, i, far, at))
                 {
                     return true;
                 }
-                let is_cut = (0..m).any(|j| aside[j] != u[j] + way * direction[j]);
+                let is_cut = (0..m).any(|j| sideways[j] != u[j] + way * direction[j]);
                 slacks += slack.filter(|_| !is_cut).unwrap_or(f64::NAN);
             }
             for d in &mut direction[..m] {
@@ -612,13 +612,13 @@ impl PeriodProblem<'_> {
         false
     }
 
-    /// Whether every hard row but `i` holds from `aside` on to where it is only `far` from u_ref, as where no other row is active.
-    fn others_leave_room(&self, aside: &[f64], i: usize, far: f64, at: &mut Linearised) -> bool {
-        let (way, soft) = (self.distance(aside) - far, self.soft());
+    /// Whether every hard row but `i` holds from `sideways` on to where it is only `far` from u_ref, as where no other row is active.
+    fn others_leave_room(&self, sideways: &[f64], i: usize, far: f64, at: &mut Linearised) -> bool {
+        let (way, soft) = (self.distance(sideways) - far, self.soft());
         let has_row = |j: &usize| *j != i && !soft.contains(*j) && !self.requirements[*j].bound.is_zero();
         (0..self.requirements.len()).filter(has_row).all(|j| {
-            let normal = norm(at.rows[j].normal[..aside.len()].iter().copied());
-            self.slack(&self.requirements[j], aside, at.evaluations).is_some_and(|s| s > way * normal)
+            let normal = norm(at.rows[j].normal[..sideways.len()].iter().copied());
+            self.slack(&self.requirements[j], sideways, at.evaluations).is_some_and(|s| s > way * normal)
         })
     }
 

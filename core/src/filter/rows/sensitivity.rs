@@ -94,10 +94,10 @@ pub struct BarrierDerivative {
 pub enum NoDerivative {
     /// Its [`DerivativeSource`](crate::lie::DerivativeSource) does not give derivatives along a direction.
     Source(usize),
-    /// Its promise is anchored at this sample along a profile of one's own that does not give its
+    /// Its promise is anchored at this sample along a custom profile that does not give its
     /// [derivative](crate::convergence::profile::Profile::directional).
     Profile(usize),
-    /// Its constraint is one of one's own ([`Condition`](crate::convergence::condition::Condition)).
+    /// Its constraint is a custom one ([`Condition`](crate::convergence::condition::Condition)).
     Condition(usize),
 }
 
@@ -320,7 +320,7 @@ impl Rows {
         Ok(())
     }
 
-    /// The derivative where the filter is not armed yet: u_ref passes, and h is told.
+    /// The derivative where the filter is not armed yet: u_ref passes, and h is reported.
     fn directional_unarmed(
         &self,
         t: f64,
@@ -392,7 +392,7 @@ impl Rows {
         // The derivative of u: (8) with the active rows, else the direction of u_ref but at bounds.
         let active = qp.active();
         if active.iter().any(|a| matches!(a.constraint, Constraint::Row(_))) {
-            // Where rows bend so much that (8) has no solution, as if they did not.
+            // Where rows are curved so much that (8) has no solution, as if they did not.
             for bends in [true, false] {
                 let mut equations = Equations::new(direction.u);
                 for active in active {

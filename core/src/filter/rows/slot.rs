@@ -49,7 +49,7 @@ pub enum End {
     OnArrival,
 }
 
-/// The standing of a barrier's constraint where not all can be met within the input bounds.
+/// How a barrier's constraint is treated where not all can be met within the input bounds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
@@ -82,7 +82,7 @@ pub(crate) struct BarrierSlot {
     pub(crate) now: SlotSample,
 }
 
-/// Result of a sample for one barrier: scratch memory that every sample writes anew.
+/// Result of a sample for one barrier: scratch memory that every sample rewrites.
 pub(crate) struct SlotSample {
     /// Whether the barrier is in force; the other fields mean something only where it is.
     pub(crate) in_force: bool,
@@ -237,7 +237,7 @@ impl BarrierSlot {
         self.now.in_force.then(|| self.promise.over_period(promise, moment.begin, stack, duration))?
     }
 
-    /// The course of h until the next sample, as the derivatives foresee it.
+    /// The evolution of h until the next sample, as the derivatives predict it.
     pub(super) fn outlook(&self) -> Outlook<'_> {
         let SlotSample { derivatives, shortfall, .. } = &self.now;
         let (n, drift) = (self.degree(), &derivatives.drift);
@@ -355,24 +355,24 @@ impl BarrierSlot {
         }
     }
 
-    /// Gives up a deadline that is lost, where the settings say so: starts the promise anew with a later one
-    /// ([`Infeasible::Soonest`]). Returns whether it did.
+    /// Gives up a deadline that is lost, where the settings say so: restarts the promise with a later one
+    /// ([`Infeasible::Earliest`]). Returns whether it did.
     fn postpone(&self, promise: &mut FixedTimeState, moment: &Moment, bounds: &Bounds, h: &[f64]) -> bool {
-        /// New deadline over the soonest time not ruled out: stopping in the set takes longer than getting there.
+        /// New deadline over the earliest time not ruled out: stopping in the set takes longer than getting there.
         const FACTOR: f64 = 2.0;
         const GROWTH: f64 = 1.5;
         /// The longest deadline looked for, in units of the configured one.
         const HORIZON: f64 = 1e3;
-        if self.promise.settings().infeasible != Infeasible::Soonest {
+        if self.promise.settings().infeasible != Infeasible::Earliest {
             return false;
         }
         let configured = self.promise.deadline();
         let now = (moment.begin, &*self.now.from);
-        let soonest = reach::soonest(&*self.source, now, bounds, HORIZON * configured);
+        let earliest = reach::earliest_arrival(&*self.source, now, bounds, HORIZON * configured);
         let factor = FACTOR * elementary::powi(GROWTH, promise.postponed.min(16) as i32);
-        // Near the set the soonest time tends to zero: never shorter than ten samples.
-        let deadline = match soonest {
-            Some(soonest) if soonest > 0.0 => (factor * soonest).max(10.0 * moment.period.unwrap_or(0.0)),
+        // Near the set the earliest time tends to zero: never shorter than ten samples.
+        let deadline = match earliest {
+            Some(earliest) if earliest > 0.0 => (factor * earliest).max(10.0 * moment.period.unwrap_or(0.0)),
             _ => configured,
         };
         let postponed = promise.postponed.saturating_add(1);

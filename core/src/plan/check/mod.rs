@@ -1,15 +1,15 @@
 //! The exact check: the plant run ahead under a law, with every requirement looked at, between the nodes too.
 //!
-//! Under one input, state and h are followed by their Taylor [courses](crate::lie::Course) in pieces. A piece ends where the
-//! last terms of a state no longer vanish, and is halved until the course of every state is a solution on all of it: by
-//! [enclosures](crate::interval) of the plant's rate there. Where a source has none, in its middle and at its end, and it is
-//! assumed that what bends the plant shows there.
+//! Under one input, state and h are followed by their Taylor [expansions](crate::lie::Expansion) in pieces. A piece ends
+//! where the last terms of a state no longer vanish, and is halved until the expansion of every state is a solution on all
+//! of it: by [enclosures](crate::interval) of the plant's rate there. Where a source has none, in its middle and at its
+//! end, and it is assumed that what curves the plant's motion shows there.
 //!
-//! On a piece h has a lower bound: the least Bernstein coefficient of its course, which none of its values falls below,
-//! less its last terms and less four times what the course misses h by at four instants. What bends h between them shows in
-//! enclosures: of h on the piece, or of the last coefficient of a course that begins anywhere on it, which by Taylor's theorem
-//! is all that the others leave open. Where these do not decide, the piece is halved for this h. Where a source has no
-//! enclosures, it is assumed that h bends as those instants show.
+//! On a piece h has a lower bound: the least Bernstein coefficient of its expansion, which none of its values falls below,
+//! less its last terms and less four times what the expansion misses h by at four instants. What curves h between them
+//! shows in enclosures: of h on the piece, or of the last coefficient of an expansion that begins anywhere on it, which by
+//! Taylor's theorem is all that the others leave open. Where these do not decide, the piece is halved for this h. Where a
+//! source has no enclosures, it is assumed that h bends as those instants show.
 //!
 //! | module | owns |
 //! |---|---|
@@ -25,25 +25,26 @@ mod terminal;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::course::{self, at, shifted};
+use super::backup_plan::{BackupPlan, Tightest};
+use super::expansion::{self, at, shifted};
 use super::law::Reference;
 use super::model::Model;
-use super::witness::{Tightest, Witness};
 use super::{Failure, Integral, Requirement};
 use crate::MAX_INPUTS;
 use crate::interval::Interval;
-use crate::lie::{COURSE, Course, CourseOver, FEW_ORDERS, RateOver};
+use crate::lie::{EXPANSION_ORDERS, Expansion, ExpansionOver, FEW_ORDERS, RateOver};
 use crate::scalar::all_finite;
-use perturbed::{Aside, SPREADS};
+use perturbed::{Perturbed, SPREADS};
 
 /// Most pieces of a roll-out.
 const MOST_PIECES: u32 = 100_000;
-/// The last terms of a state's course at the end of a piece, as a part of its size.
+/// The last terms of a state's expansion at the end of a piece, as a part of its size.
 const TRUNCATED: f64 = 1e-10;
-/// By how much the course of a state may miss being a solution over the piece, as a part of its change there and beside 1.
+/// By how much the expansion of a state may miss being a solution over the piece, as a part of its change there and beside
+/// 1.
 const RESIDUAL: f64 = 1e-8;
 /// Coefficients of the rate of the states that bound this: first few, then all.
-const ORDERS: [usize; 2] = [FEW_ORDERS, COURSE - 1];
+const ORDERS: [usize; 2] = [FEW_ORDERS, EXPANSION_ORDERS - 1];
 /// How much longer than a piece that has been halved the next may be. The one after that by the square of it, and so on.
 const LONGER: f64 = 1.2;
 /// The margin at the edge of a set, in units of that inside: what round-off may miss.
@@ -53,7 +54,7 @@ const HALVINGS: u32 = 14;
 const SHARPER: u32 = 3;
 /// The bound of a piece that is sharp enough, as a part of the least value seen.
 const SHARP: f64 = 0.8;
-/// Instants of a piece at which its course is compared with h, and what a difference there counts for between them.
+/// Instants of a piece at which its expansion is compared with h, and what a difference there counts for between them.
 const INSTANTS: u32 = 4;
 const MISSED: f64 = 4.0;
 /// Change of a state over a hold that is round-off, as a part of its size.
@@ -85,23 +86,23 @@ pub(super) struct Walk<'a> {
     strictness: f64,
     t: f64,
     x: Vec<f64>,
-    /// The courses of the states from here on, a state on them and its rate.
-    path: Vec<Course>,
+    /// The expansions of the states from here on, a state on them and its rate.
+    path: Vec<Expansion>,
     point: Vec<f64>,
     rate: Vec<f64>,
-    /// Enclosures of those courses and of the rate on a piece.
-    over: Vec<CourseOver>,
+    /// Enclosures of those expansions and of the rate on a piece.
+    over: Vec<ExpansionOver>,
     rate_over: Vec<RateOver>,
-    /// The courses beside those of the states.
-    beside: Vec<Course>,
+    /// The expansions beside those of the states.
+    beside: Vec<Expansion>,
     pieces: u32,
     /// The most of them.
     pub(super) most_pieces: u32,
     /// The longest piece in s to try, and how much longer the next one may be.
     longest: f64,
     growth: f64,
-    aside: Aside,
-    witness: Witness,
+    perturbed: Perturbed,
+    backup_plan: BackupPlan,
     started: f64,
     grid: Grid,
 }
@@ -122,18 +123,22 @@ impl<'a> Walk<'a> {
             strictness,
             t,
             x: x.to_vec(),
-            path: vec![[0.0; COURSE]; x.len()],
+            path: vec![[0.0; EXPANSION_ORDERS]; x.len()],
             point: x.to_vec(),
             rate: x.to_vec(),
             over: Vec::with_capacity(x.len()),
-            rate_over: vec![[Interval::ALL; COURSE - 1]; x.len()],
-            beside: vec![[0.0; COURSE]; x.len()],
+            rate_over: vec![[Interval::ALL; EXPANSION_ORDERS - 1]; x.len()],
+            beside: vec![[0.0; EXPANSION_ORDERS]; x.len()],
             pieces: 0,
             most_pieces: MOST_PIECES,
             longest: f64::INFINITY,
             growth: LONGER,
-            aside: Aside::new(x),
-            witness: Witness { rates: vec![0.0; x.len()], is_even: grid.even, ..Witness::default() },
+            perturbed: Perturbed::new(x),
+            backup_plan: BackupPlan {
+                rates: vec![0.0; x.len()],
+                is_uniform: grid.even,
+                ..BackupPlan::default()
+            },
             started: t,
             grid,
         };
@@ -146,8 +151,8 @@ impl<'a> Walk<'a> {
     }
 
     /// Takes over the rates of the plan before.
-    pub(super) fn after(mut self, before: &Witness) -> Self {
-        for (rate, before) in self.witness.rates.iter_mut().zip(&before.rates) {
+    pub(super) fn after(mut self, before: &BackupPlan) -> Self {
+        for (rate, before) in self.backup_plan.rates.iter_mut().zip(&before.rates) {
             *rate = rate.max(*before);
         }
         self
@@ -172,14 +177,14 @@ impl<'a> Walk<'a> {
     /// Notes that h of requirement `i` is at least `h` around `t`.
     fn note(&mut self, i: usize, t: f64, h: f64) -> Result<(), Failure> {
         let (barrier, missing) = (self.requirements[i].barrier, h - self.least_of(i));
-        // Not-a-number is broken too.
+        // NaN counts as broken too.
         if missing.is_nan() || missing < 0.0 {
             return Err(Failure::Broken { barrier, time: t, slack: missing });
         }
         let slack = h - self.margin(i);
         let counts = !self.requirements[i].is_limit;
-        if counts && self.witness.tightest.is_none_or(|least| slack < least.slack) {
-            self.witness.tightest = Some(Tightest { barrier, time: t, slack });
+        if counts && self.backup_plan.tightest.is_none_or(|least| slack < least.slack) {
+            self.backup_plan.tightest = Some(Tightest { barrier, time: t, slack });
         }
         Ok(())
     }
@@ -189,18 +194,18 @@ impl<'a> Walk<'a> {
         let m = self.model.inputs();
         let (mut u, mut beside) = ([0.0; MAX_INPUTS], [0.0; MAX_INPUTS]);
         law(&self.x, &mut u[..m]);
-        for (point, (x, d)) in self.point.iter_mut().zip(self.x.iter().zip(&self.aside.x)) {
+        for (point, (x, d)) in self.point.iter_mut().zip(self.x.iter().zip(&self.perturbed.x)) {
             *point = x + d;
         }
         law(&self.point, &mut beside[..m]);
-        self.aside.u = core::array::from_fn(|i| beside[i] - u[i]);
+        self.perturbed.u = core::array::from_fn(|i| beside[i] - u[i]);
         self.hold_until_sample(&u[..m], end)?;
         let most = match self.strictness {
             s if s >= 1.0 => SPREADS[0],
             s if s > 0.0 => SPREADS[1],
             _ => f64::INFINITY,
         };
-        if self.aside.note(&self.x) <= most { Ok(()) } else { Err(Failure::Unsteady) }
+        if self.perturbed.note(&self.x) <= most { Ok(()) } else { Err(Failure::Unsteady) }
     }
 
     /// The same of `u`, whatever the state is.
@@ -229,10 +234,10 @@ impl<'a> Walk<'a> {
         }
         let mut input = [0.0; MAX_INPUTS];
         input[..u.len()].copy_from_slice(u);
-        if !self.witness.inputs.is_empty() {
-            self.witness.effort = self.witness.effort.max(self.model.bounds.part(u));
+        if !self.backup_plan.inputs.is_empty() {
+            self.backup_plan.effort = self.backup_plan.effort.max(self.model.bounds.part(u));
         }
-        self.witness.inputs.push((end, input));
+        self.backup_plan.inputs.push((end, input));
         Ok(())
     }
 
@@ -256,8 +261,8 @@ impl<'a> Walk<'a> {
         let Integral { state, input } = integral;
         let (rate, mut held) = (u[input], u.to_vec());
         held[input] = 0.0;
-        let aside_rate = core::mem::take(&mut self.aside.u[input]);
-        self.witness.rates[state] = self.witness.rates[state].max(rate.abs());
+        let perturbed_rate = core::mem::take(&mut self.perturbed.u[input]);
+        self.backup_plan.rates[state] = self.backup_plan.rates[state].max(rate.abs());
         let period = self.grid.period;
         while self.t < end {
             // The next sample; one that is here but for round-off has passed.
@@ -265,11 +270,11 @@ impl<'a> Walk<'a> {
             let sample = self.started + (passed + 1) as f64 * period;
             let sample = if sample < end - 1e-6 * period { sample } else { end };
             let (from, to) = (self.x[state], self.x[state] + rate * (sample - self.t));
-            let aside = 0.5 * (aside_rate * (sample - self.t));
+            let perturbed = 0.5 * (perturbed_rate * (sample - self.t));
             self.x[state] = 0.5 * (from + to);
-            self.aside.x[state] += aside;
+            self.perturbed.x[state] += perturbed;
             self.move_to(&held, sample)?;
-            self.aside.x[state] += aside;
+            self.perturbed.x[state] += perturbed;
             self.x[state] = to;
             for (i, requirement) in self.requirements.iter().enumerate() {
                 if requirement.is_in_force(sample) {
@@ -284,7 +289,7 @@ impl<'a> Walk<'a> {
     /// Moves on by a piece, to `node` at most.
     fn advance(&mut self, u: &[f64], node: f64) -> Result<(), Failure> {
         self.pieces += 1;
-        self.witness.pieces = self.pieces;
+        self.backup_plan.pieces = self.pieces;
         if self.pieces > self.most_pieces {
             return Err(Failure::TooLong);
         }
@@ -293,8 +298,8 @@ impl<'a> Walk<'a> {
             return Err(Failure::Singular);
         }
         let whole = node - self.t;
-        let mut dt = self.path.iter().fold(whole, |dt, c| course::reach(c, TRUNCATED * size(c), dt));
-        // Bends that have cut the piece before short are there still.
+        let mut dt = self.path.iter().fold(whole, |dt, c| expansion::reach(c, TRUNCATED * size(c), dt));
+        // Curvature that has cut the piece before short is still there.
         dt = dt.min(self.longest);
         while !self.is_solution(u, dt) {
             dt *= 0.5;
@@ -313,8 +318,8 @@ impl<'a> Walk<'a> {
         if end <= self.t {
             return Err(Failure::TooLong);
         }
-        for (greatest, c) in self.witness.rates.iter_mut().zip(&self.path) {
-            *greatest = greatest.max(c[1].abs()).max(course::slope(c, dt).abs());
+        for (greatest, c) in self.backup_plan.rates.iter_mut().zip(&self.path) {
+            *greatest = greatest.max(c[1].abs()).max(expansion::slope(c, dt).abs());
         }
         let (from, path, over) = (self.t, core::mem::take(&mut self.path), core::mem::take(&mut self.over));
         let mut in_force = (0..self.requirements.len()).filter(|i| self.requirements[*i].is_in_force(from));
@@ -324,7 +329,7 @@ impl<'a> Walk<'a> {
         });
         // What has failed is not followed further.
         if met.is_ok() {
-            self.move_aside(u, &path, dt);
+            self.move_perturbed(u, &path, dt);
         }
         for (x, c) in self.x.iter_mut().zip(&path) {
             *x = at(c, dt);
@@ -333,13 +338,13 @@ impl<'a> Walk<'a> {
         met
     }
 
-    /// Whether the courses of the states are a solution until `dt` s after their begin. Leaves what encloses them.
+    /// Whether the expansions of the states are a solution until `dt` s after their begin. Leaves what encloses them.
     fn is_solution(&mut self, u: &[f64], dt: f64) -> bool {
         let plant = self.model.plant;
         self.over.clear();
-        self.over.extend(self.path.iter().map(|c| course::over(c, dt)));
-        // Not-a-number is not small.
-        let is_small = |missed: f64, over: &CourseOver| missed * dt <= allowed(over[0]);
+        self.over.extend(self.path.iter().map(|c| expansion::over(c, dt)));
+        // NaN is not small.
+        let is_small = |missed: f64, over: &ExpansionOver| missed * dt <= allowed(over[0]);
         for orders in ORDERS {
             if !plant.rates_over(&self.over, u, orders, &mut self.rate_over) {
                 return [0.5 * dt, dt].into_iter().all(|after| {
@@ -348,21 +353,21 @@ impl<'a> Walk<'a> {
                 });
             }
             let mut rates = self.rate_over.iter().zip(&self.over);
-            if rates.all(|(rate, over)| is_small(course::missed(&rate[..orders], over, dt), over)) {
+            if rates.all(|(rate, over)| is_small(expansion::missed(&rate[..orders], over, dt), over)) {
                 return true;
             }
         }
         false
     }
 
-    /// Writes what the course of each state misses its rate by `after` s after its begin to `rate`.
+    /// Writes what the expansion of each state misses its rate by `after` s after its begin to `rate`.
     fn miss(&mut self, u: &[f64], after: f64) {
         for (x, c) in self.point.iter_mut().zip(&self.path) {
             *x = at(c, after);
         }
         self.model.plant.rate(&self.point, u, &mut self.rate);
         for (rate, c) in self.rate.iter_mut().zip(&self.path) {
-            *rate = (course::slope(c, after) - *rate).abs();
+            *rate = (expansion::slope(c, after) - *rate).abs();
         }
     }
 
@@ -371,19 +376,19 @@ impl<'a> Walk<'a> {
     fn least(
         &mut self,
         i: usize,
-        (path, over): (&[Course], &[CourseOver]),
+        (path, over): (&[Expansion], &[ExpansionOver]),
         (from, dt): (f64, f64),
         halvings: u32,
     ) -> f64 {
         let (model, margin, needed) = (self.requirements[i].model, self.margin(i), self.least_of(i));
-        let tightest = self.witness.tightest.map_or(f64::INFINITY, |tightest| tightest.slack);
+        let tightest = self.backup_plan.tightest.map_or(f64::INFINITY, |tightest| tightest.slack);
         // Far from its edge no more need be known.
         let time = Interval::new(from, from + dt);
         let lowest = model.value_over(time, over).map(|h| h.low);
         if let Some(low) = lowest.filter(|low| *low >= needed && low - margin >= tightest) {
             return low;
         }
-        let mut h = [0.0; COURSE];
+        let mut h = [0.0; EXPANSION_ORDERS];
         model.value_along(from, path, &mut h);
         let (mut least, mut missed) = (h[0], 0.0_f64);
         for k in 1..=INSTANTS {
@@ -397,7 +402,7 @@ impl<'a> Walk<'a> {
             }
             (least, missed) = (least.min(value), missed.max((value - at(&h, after)).abs()));
         }
-        let bound = course::least(&h, dt) - course::last_terms(&h, dt) - MISSED * missed;
+        let bound = expansion::least(&h, dt) - expansion::last_terms(&h, dt) - MISSED * missed;
         let slack = bound - margin;
         let is_sharp =
             slack >= tightest || slack >= SHARP * (least - margin) || halvings + SHARPER <= HALVINGS;
@@ -406,10 +411,11 @@ impl<'a> Walk<'a> {
             return least;
         }
         if bound >= needed && is_sharp || halvings == 0 {
-            // Whatever bends h between these instants: by what it takes on the piece, or by Taylor's theorem.
+            // Whatever curves h between these instants: by what it takes on the piece, or by Taylor's theorem.
             let enclosed = lowest.filter(|low| *low < needed).map_or(f64::INFINITY, |low| {
-                h[COURSE - 1] = model.last_over(time, over).map_or(f64::NEG_INFINITY, |last| last.low);
-                low.max(course::least(&h, dt))
+                h[EXPANSION_ORDERS - 1] =
+                    model.last_over(time, over).map_or(f64::NEG_INFINITY, |last| last.low);
+                low.max(expansion::least(&h, dt))
             });
             if enclosed >= needed || halvings == 0 {
                 return bound.min(least).min(enclosed);
@@ -421,16 +427,16 @@ impl<'a> Walk<'a> {
             return f64::NEG_INFINITY;
         }
         let half = 0.5 * dt;
-        let enclosed = |path: &[Course]| path.iter().map(|c| course::over(c, half)).collect::<Vec<_>>();
+        let enclosed = |path: &[Expansion]| path.iter().map(|c| expansion::over(c, half)).collect::<Vec<_>>();
         let left = self.least(i, (path, &enclosed(path)), (from, half), halvings - 1);
         if left < needed {
             return left;
         }
-        let path: Vec<Course> = path.iter().map(|c| shifted(c, half)).collect();
+        let path: Vec<Expansion> = path.iter().map(|c| shifted(c, half)).collect();
         left.min(self.least(i, (&path, &enclosed(&path)), (from + half, half), halvings - 1))
     }
 
-    /// Follows the rest of `reference`.
+    /// Follows the remainder of `reference`.
     pub(super) fn follow(&mut self, reference: &Reference) -> Result<(), Failure> {
         while let Some(k) = reference.hold_at(self.t, self.grid.slack()) {
             let (model, t) = (self.model, self.t);
@@ -452,7 +458,7 @@ fn allowed(over: Interval) -> f64 {
     RESIDUAL * (1.0 + (over.high - over.low)) + ROUND_OFF * over.low.abs()
 }
 
-/// The size of a state, by which the last terms of its course are measured.
-fn size(course: &Course) -> f64 {
-    1.0 + course[0].abs()
+/// The size of a state, by which the last terms of its expansion are measured.
+fn size(expansion: &Expansion) -> f64 {
+    1.0 + expansion[0].abs()
 }

@@ -4,8 +4,8 @@ use alloc::vec::Vec;
 
 use crate::interval::Interval;
 
-/// Instants of that way at which the plant has to rest, and h is looked at otherwise.
-const WAY_INSTANTS: u32 = 32;
+/// Instants of that way at which the plant has to be at an equilibrium, and h is looked at otherwise.
+const PATH_INSTANTS: u32 = 32;
 
 /// How a number goes on to move, window of time by window: it creeps, above a series that dies away.
 #[derive(Clone, Copy)]
@@ -65,9 +65,9 @@ fn told_apart([first, before, now]: [f64; 3], round_off: f64) -> Option<[f64; 4]
 }
 
 /// The states at instants of their way, from where they are on for so many windows.
-pub(super) fn way(ahead: &[(f64, Motion)], windows: f64) -> impl Iterator<Item = Vec<f64>> {
-    (0..=WAY_INSTANTS).map(move |instant| {
-        let part = f64::from(instant) / f64::from(WAY_INSTANTS);
+pub(super) fn states_along(ahead: &[(f64, Motion)], windows: f64) -> impl Iterator<Item = Vec<f64>> {
+    (0..=PATH_INSTANTS).map(move |instant| {
+        let part = f64::from(instant) / f64::from(PATH_INSTANTS);
         ahead.iter().map(|(x, motion)| motion.at(*x, part, windows)).collect()
     })
 }

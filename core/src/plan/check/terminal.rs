@@ -1,61 +1,64 @@
-//! The end of a plan: whether the plant stays for ever where the stopping law brings it to rest, or how the plan ends without a rest.
+//! The end of a plan: whether the plant stays for ever where the stopping law brings it to rest, or how the plan ends
+//! without an equilibrium.
 
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::motion::{Motion, way};
+use super::motion::{Motion, states_along};
 use super::{ROUND_OFF, Walk, size};
 use crate::interval::Interval;
-use crate::lie::COURSE;
-use crate::plan::course::{self, at};
-use crate::plan::law::{Brake, Reference};
+use crate::lie::EXPANSION_ORDERS;
+use crate::plan::backup_plan::BackupPlan;
+use crate::plan::expansion::{self, at};
+use crate::plan::law::{Reference, StoppingController};
 use crate::plan::model::{differences, largest_eigenvalue};
-use crate::plan::witness::Witness;
 use crate::plan::{Failure, Integral, Requirement};
 
-/// Rate of the state that counts as rest, as a part of the largest on the way.
-const AT_REST: f64 = 1e-6;
-/// Number of holds for which a drift at rest has to leave every set where it is.
+/// Rate of the state that counts as an equilibrium, as a part of the largest on the way.
+const AT_EQUILIBRIUM: f64 = 1e-6;
+/// Number of holds for which a drift at an equilibrium has to leave every set where it is.
 const DRIFT: f64 = 1e3;
-/// Holds of the braking law in which what is left at a rest is followed.
+/// Holds of the stopping controller in which what is left at an equilibrium is followed.
 const SETTLING: usize = 128;
-/// Halvings of the way of the states that is left at a rest, on which h is enclosed.
-const WAY_HALVINGS: u32 = 6;
+/// Halvings of the way of the states that is left at an equilibrium, on which h is enclosed.
+const PATH_HALVINGS: u32 = 6;
 /// What h changes by in one of them for that to be round-off, as a part of what it is made of.
 const SETTLED: f64 = 64.0 * f64::EPSILON;
-/// Part of a state's size by which it is moved to see whether a deviation from a rest grows, and by what part of it that may in
-/// all the time that is promised.
+/// Part of a state's size by which it is moved to see whether a deviation from an equilibrium grows, and by what part of it
+/// that may in all the time that is promised.
 const BESIDE: f64 = 1e-5;
 const GROWS: f64 = 0.1;
-/// Most pieces in which a hold of the braking law at a rest is followed, and the part of one that a kink is passed in.
+/// Most pieces in which a hold of the stopping controller at an equilibrium is followed, and the part of one that a kink is
+/// passed in.
 const CREPT: u32 = 1000;
 const KINK: f64 = 1.0 / 16.0;
 /// The time in s for which what does not die away has to leave every set where it is.
 const LONG: f64 = 1e5;
-/// Most holds of the braking law after a reference.
-const BRAKING: usize = 200;
+/// Most holds of the stopping controller after a reference.
+const STOPPING_HOLDS: usize = 200;
 /// Later times at which a set that does not move has the same h: in units of the plan's length, and in s.
 const LATER: [[f64; 4]; 2] = [[0.1234, 0.618, 1.7, 3.3], [3.7, 61.7, 1013.0, 86413.0]];
 
 impl Walk<'_> {
-    /// Brakes until the plant is at rest where it can stay for ever.
-    pub(in crate::plan) fn stop(mut self, brake: &Brake) -> Result<Witness, Failure> {
+    /// Applies the stopping controller until the plant is at an equilibrium where it can stay for ever.
+    pub(in crate::plan) fn stop(mut self, stopping: &StoppingController) -> Result<BackupPlan, Failure> {
         let mut u = vec![0.0; self.model.inputs()];
-        let hold = brake.hold.max(self.grid.period);
+        let hold = stopping.hold.max(self.grid.period);
         let (mut failure, mut due, mut wait) = (Failure::NoRest, 0, 1);
-        for k in 0..BRAKING {
+        for k in 0..STOPPING_HOLDS {
             // Followed far ahead is what stands still, and where it did not stay not again at every hold.
-            let rest = match self.is_still(brake, hold, &mut u) && (k >= due || k + 1 == BRAKING) {
-                true => {
-                    (due, wait) = (k + wait, 2 * wait);
-                    self.stays(brake, hold, &u)
-                }
-                false => Ok(false),
-            };
+            let equilibrium =
+                match self.is_still(stopping, hold, &mut u) && (k >= due || k + 1 == STOPPING_HOLDS) {
+                    true => {
+                        (due, wait) = (k + wait, 2 * wait);
+                        self.stays(stopping, hold, &u)
+                    }
+                    false => Ok(false),
+                };
             let model = self.model;
-            self.hold_under(|x, u| brake.input(&model, x, u), self.t + hold)?;
-            match rest {
-                Ok(true) => return Ok(Witness { until: f64::INFINITY, ..self.witness }),
+            self.hold_under(|x, u| stopping.input(&model, x, u), self.t + hold)?;
+            match equilibrium {
+                Ok(true) => return Ok(BackupPlan { until: f64::INFINITY, ..self.backup_plan }),
                 Ok(false) => {}
                 // What still drifts out may do so no longer a hold later.
                 Err(drifts_out) => failure = drifts_out,
@@ -64,9 +67,9 @@ impl Walk<'_> {
         Err(failure)
     }
 
-    /// Ends where `reference` does, without a rest, if that was still ahead. Its last input is held until then where samples
-    /// lie beside its own.
-    pub(in crate::plan) fn end(mut self, reference: &Reference) -> Result<Witness, Failure> {
+    /// Ends where `reference` does, without an equilibrium, if that was still ahead. Its last input is held until then
+    /// where samples lie beside its own.
+    pub(in crate::plan) fn end(mut self, reference: &Reference) -> Result<BackupPlan, Failure> {
         let (Some(&until), slack) = (reference.times.last(), self.grid.slack()) else {
             return Err(Failure::NoRest);
         };
@@ -74,52 +77,55 @@ impl Walk<'_> {
             return Err(Failure::NoRest);
         }
         if self.t < until
-            && let Some((_, u)) = self.witness.inputs.pop()
+            && let Some((_, u)) = self.backup_plan.inputs.pop()
         {
             self.hold(&u[..self.model.inputs()], until)?;
         }
-        Ok(Witness { until, ..self.witness })
+        Ok(BackupPlan { until, ..self.backup_plan })
     }
 
-    /// Whether the plant is at rest here, where it can stay for ever, so that a plan may end.
-    pub(in crate::plan) fn may_end(&mut self, brake: &Brake) -> bool {
-        let (mut u, tightest) = (vec![0.0; self.model.inputs()], self.witness.tightest);
-        let hold = brake.hold.max(self.grid.period);
-        let ends = self.is_still(brake, hold, &mut u) && matches!(self.stays(brake, hold, &u), Ok(true));
-        self.witness.tightest = tightest;
+    /// Whether the plant is at an equilibrium here, where it can stay for ever, so that a plan may end.
+    pub(in crate::plan) fn may_end(&mut self, stopping: &StoppingController) -> bool {
+        let (mut u, tightest) = (vec![0.0; self.model.inputs()], self.backup_plan.tightest);
+        let hold = stopping.hold.max(self.grid.period);
+        let ends =
+            self.is_still(stopping, hold, &mut u) && matches!(self.stays(stopping, hold, &u), Ok(true));
+        self.backup_plan.tightest = tightest;
         ends
     }
 
-    /// Whether the plant that stands still under `u`, the input of `brake`, can stay here for ever. Notes what is tightest there.
-    fn stays(&mut self, brake: &Brake, hold: f64, u: &[f64]) -> Result<bool, Failure> {
+    /// Whether the plant that stands still under `u`, the input of `stopping`, can stay here for ever. Notes what is tightest there.
+    fn stays(&mut self, stopping: &StoppingController, hold: f64, u: &[f64]) -> Result<bool, Failure> {
         // Not at the edge of a set, where a margin has to be there later.
         if !(0..self.requirements.len()).all(|i| self.is_firm(i)) {
             return Ok(false);
         }
-        let tightest = self.witness.tightest;
-        let stays = self.rests(u, hold).map(|rests| rests && self.settles(brake, hold));
+        let tightest = self.backup_plan.tightest;
+        let stays =
+            self.is_equilibrium(u, hold).map(|at_equilibrium| at_equilibrium && self.settles(stopping, hold));
         if !matches!(stays, Ok(true)) {
-            self.witness.tightest = tightest;
+            self.backup_plan.tightest = tightest;
         }
         stays
     }
 
-    /// Whether the plant stands still here under the input of `brake`, which is written to `u`.
-    fn is_still(&mut self, brake: &Brake, hold: f64, u: &mut [f64]) -> bool {
+    /// Whether the plant stands still here under the input of `stopping`, which is written to `u`.
+    fn is_still(&mut self, stopping: &StoppingController, hold: f64, u: &mut [f64]) -> bool {
         self.point.copy_from_slice(&self.x);
-        self.is_still_at_point(brake, hold, u)
+        self.is_still_at_point(stopping, hold, u)
     }
 
     /// The same at the state in `point`.
-    fn is_still_at_point(&mut self, brake: &Brake, hold: f64, u: &mut [f64]) -> bool {
-        brake.input(&self.model, &self.point, u);
+    fn is_still_at_point(&mut self, stopping: &StoppingController, hold: f64, u: &mut [f64]) -> bool {
+        stopping.input(&self.model, &self.point, u);
         self.model.plant.rate(&self.point, u, &mut self.rate);
-        let small = |i: usize| AT_REST * self.witness.rates[i] + ROUND_OFF * self.point[i].abs() / hold;
+        let small =
+            |i: usize| AT_EQUILIBRIUM * self.backup_plan.rates[i] + ROUND_OFF * self.point[i].abs() / hold;
         self.rate.iter().enumerate().all(|(i, rate)| rate.abs() <= small(i))
     }
 
-    /// Whether a plant at rest here stays in all sets though it may creep on under the braking law.
-    fn settles(&mut self, brake: &Brake, hold: f64) -> bool {
+    /// Whether a plant at an equilibrium here stays in all sets though it may creep on under the stopping controller.
+    fn settles(&mut self, stopping: &StoppingController, hold: f64) -> bool {
         let (mut x, mut u) = (self.x.clone(), vec![0.0; self.model.inputs()]);
         let (requirements, t) = (self.requirements, self.t);
         let h = |i: usize, x: &[f64]| {
@@ -132,7 +138,7 @@ impl Walk<'_> {
         let mut seen: Vec<_> = asked.map(|i| (i, vec![h(i, &x)])).collect();
         let mut states = vec![x.clone()];
         for holds in 1..=SETTLING {
-            brake.input(&self.model, &x, &mut u);
+            stopping.input(&self.model, &x, &mut u);
             self.creep(&mut x, &u, hold);
             states.push(x.clone());
             for (i, seen) in &mut seen {
@@ -148,7 +154,7 @@ impl Walk<'_> {
             }
             let size = x.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
             let last = |seen: &dyn Fn(usize) -> f64| [4, 3, 2, 1, 0].map(|back| seen(holds - back * window));
-            // The rest of a plan is asked for half as long, so that time may pass.
+            // The remainder of a plan is asked for half as long, so that time may pass.
             let windows = |i: usize| {
                 let time = (self.requirements[i].until - self.t).min(LONG * self.strictness);
                 time / (hold * window as f64)
@@ -161,7 +167,7 @@ impl Walk<'_> {
             if !stays {
                 continue;
             }
-            // What bends h further on the way of the states has not shown yet, nor what a state does that gathers pace.
+            // What curves h further on the way of the states has not shown yet, nor what a state does that gathers pace.
             let ahead = |j: usize| {
                 let motion = Motion::of(last(&|k| states[k][j]), SETTLED * (size + x[j].abs()));
                 motion.map(|motion| (x[j], motion))
@@ -169,20 +175,21 @@ impl Walk<'_> {
             let Some(ahead) = (0..x.len()).map(ahead).collect::<Option<Vec<_>>>() else { continue };
             let longest = seen.iter().map(|(i, _)| windows(*i)).fold(0.0, f64::max);
             if seen.iter().all(|(i, _)| self.stays_ahead(*i, &ahead, windows(*i)))
-                && self.rests_ahead(brake, hold, &ahead, longest)
+                && self.is_equilibrium_ahead(stopping, hold, &ahead, longest)
             {
                 let holds = longest * window as f64;
-                return (self.growth(brake, hold, &x) - 1.0) * holds <= GROWS;
+                return (self.growth(stopping, hold, &x) - 1.0) * holds <= GROWS;
             }
         }
         false
     }
 
-    /// How many times a deviation from the rest at `x` grows over a hold of the braking law: the largest eigenvalue.
-    fn growth(&mut self, brake: &Brake, hold: f64, x: &[f64]) -> f64 {
+    /// How many times a deviation from the equilibrium at `x` grows over a hold of the stopping controller: the largest
+    /// eigenvalue.
+    fn growth(&mut self, stopping: &StoppingController, hold: f64, x: &[f64]) -> f64 {
         let mut u = vec![0.0; self.model.inputs()];
         let moved = differences(x, BESIDE, x.len(), |x| {
-            brake.input(&self.model, x, &mut u);
+            stopping.input(&self.model, x, &mut u);
             self.creep(x, &u, hold);
         });
         largest_eigenvalue(&moved)
@@ -199,14 +206,14 @@ impl Walk<'_> {
         x[state] = end;
     }
 
-    /// Moves `x` on by `duration` s under `u`, to round-off: by courses of the states, past a kink that breaks them in a step of
-    /// the model.
+    /// Moves `x` on by `duration` s under `u`, to round-off: by expansions of the states, past a kink that breaks them in a
+    /// step of the model.
     fn creep(&mut self, x: &mut [f64], u: &[f64], duration: f64) {
         let (plant, mut left) = (self.model.plant, duration);
         for _ in 0..CREPT {
             plant.path(x, u, &mut self.path);
-            // However fast something dies away, its course is as short as that.
-            let smooth = self.path.iter().fold(left, |dt, c| course::reach(c, ROUND_OFF * size(c), dt));
+            // However fast something dies away, its expansion is as short as that.
+            let smooth = self.path.iter().fold(left, |dt, c| expansion::reach(c, ROUND_OFF * size(c), dt));
             let mut dt = smooth;
             let is_followed = loop {
                 self.miss(u, dt);
@@ -241,21 +248,21 @@ impl Walk<'_> {
             h >= self.least_of(i)
         };
         match model.is_still(&self.x) {
-            Some(true) => self.encloses(i, ahead, [0.0, windows], WAY_HALVINGS),
-            _ => way(ahead, windows).all(is_met),
+            Some(true) => self.encloses(i, ahead, [0.0, windows], PATH_HALVINGS),
+            _ => states_along(ahead, windows).all(is_met),
         }
     }
 
     /// The same by enclosures of h, from so many windows on until as many.
     fn encloses(&self, i: usize, ahead: &[(f64, Motion)], [from, to]: [f64; 2], halvings: u32) -> bool {
         let over = ahead.iter().map(|(x, motion)| {
-            let mut over = [Interval::ALL; COURSE];
+            let mut over = [Interval::ALL; EXPANSION_ORDERS];
             over[0] = motion.over(*x, [from, to]);
             over
         });
         // A set that does not move where the plant is now may do so farther on: at all times.
         let h = self.requirements[i].model.value_over(Interval::ALL, &over.collect::<Vec<_>>());
-        // Not-a-number is not large enough.
+        // NaN is not large enough.
         if h.is_some_and(|h| h.low >= self.least_of(i)) {
             return true;
         }
@@ -264,19 +271,25 @@ impl Walk<'_> {
         halvings > 0 && parts.into_iter().all(|part| self.encloses(i, ahead, part, halvings - 1))
     }
 
-    /// Whether the plant still rests under the input of `brake` as the states move on: a force that grows on their way has not
-    /// shown yet.
-    fn rests_ahead(&mut self, brake: &Brake, hold: f64, ahead: &[(f64, Motion)], windows: f64) -> bool {
+    /// Whether the plant is still at an equilibrium under the input of `stopping` as the states move on: a force that grows
+    /// on their way has not shown yet.
+    fn is_equilibrium_ahead(
+        &mut self,
+        stopping: &StoppingController,
+        hold: f64,
+        ahead: &[(f64, Motion)],
+        windows: f64,
+    ) -> bool {
         let mut u = vec![0.0; self.model.inputs()];
-        way(ahead, windows).all(|x| {
+        states_along(ahead, windows).all(|x| {
             self.point.copy_from_slice(&x);
-            self.is_still_at_point(brake, hold, &mut u)
+            self.is_still_at_point(stopping, hold, &mut u)
         })
     }
 
-    /// Whether a plant at rest here stays in all sets that are or will be asked for: they are still, or it is known how near
-    /// they come.
-    fn rests(&mut self, u: &[f64], hold: f64) -> Result<bool, Failure> {
+    /// Whether a plant at an equilibrium here stays in all sets that are or will be asked for: they are still, or it is
+    /// known how near they come.
+    fn is_equilibrium(&mut self, u: &[f64], hold: f64) -> Result<bool, Failure> {
         let length = (self.t - self.started).max(self.grid.period);
         self.model.plant.path(&self.x, u, &mut self.path);
         for i in 0..self.requirements.len() {
@@ -302,9 +315,9 @@ impl Walk<'_> {
                 self.note(i, begin, here.min(there))?;
                 continue;
             }
-            let mut course = [0.0; COURSE];
-            requirement.model.value_along(self.t, &self.path, &mut course);
-            let drift = course[1].abs() * (DRIFT * hold).min(requirement.until - self.t);
+            let mut expansion = [0.0; EXPANSION_ORDERS];
+            requirement.model.value_along(self.t, &self.path, &mut expansion);
+            let drift = expansion[1].abs() * (DRIFT * hold).min(requirement.until - self.t);
             self.note(i, self.t.max(requirement.from), h - drift)?;
         }
         Ok(true)

@@ -1,4 +1,4 @@
-//! Another plan behind an input, between samples: the one at hand moved in time, or a few steps of a search.
+//! Another plan behind an input, between samples: the current one moved in time, or a few steps of a search.
 
 use alloc::sync::Arc;
 use alloc::vec;
@@ -9,7 +9,7 @@ use crate::MAX_INPUTS;
 use crate::plan::check::Grid;
 use crate::plan::law::Reference;
 use crate::plan::search::{Descent, Search};
-use crate::plan::{Failure, Witness};
+use crate::plan::{BackupPlan, Failure};
 use crate::plan::{Plan, Requirement};
 use crate::scalar::all_finite;
 
@@ -28,7 +28,7 @@ type Law<'a> = &'a dyn Fn(f64, &[f64], &mut [f64]);
 /// A search for a plan behind an input that is spread over samples: which guess it is at, and how far that has come.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Sought {
+pub(crate) struct SearchProgress {
     /// The number of the guess, and of the quadratic programs for which it was followed.
     guess: u32,
     followed: u32,
@@ -38,8 +38,9 @@ pub(crate) struct Sought {
     violation: f64,
 }
 
-impl Sought {
-    /// The number of guesses: how the plan at hand is followed, the input itself and then to rest, and the first of a search.
+impl SearchProgress {
+    /// The number of guesses: how the current plan is followed, the input itself and then to an equilibrium, and the first
+    /// of a search.
     const GUESSES: u32 = 12;
 
     /// Whether it is one of a search, of which every number is finite.
@@ -77,8 +78,8 @@ impl Planner<'_> {
     /// What it fails at.
     pub(crate) fn moved(&self, plan: &Plan, t: f64, x: &[f64], u: &[f64]) -> Result<Plan, Failure> {
         let moved = self.led_by(plan, t, x, u)?.0.ok_or(Failure::Nothing)?;
-        let witness = self.behind(&moved, t, x, u)?;
-        Ok(Plan { witness, ..moved })
+        let backup_plan = self.behind(&moved, t, x, u)?;
+        Ok(Plan { backup_plan, ..moved })
     }
 
     /// `plan` moved in time, where that changes it, and the state to which `u` leads.
@@ -93,7 +94,7 @@ impl Planner<'_> {
         Ok((moved, at))
     }
 
-    /// A plan that begins with `u` for one period from `x` at `t`, by the next few steps of a search that `sought` remembers. It
+    /// A plan that begins with `u` for one period from `x` at `t`, by the next few steps of a search that `progress` remembers. It
     /// begins with how `plan` is followed from there. `None` where they lead to none; whether guesses are left then.
     ///
     /// # Errors
@@ -105,20 +106,20 @@ impl Planner<'_> {
         t: f64,
         x: &[f64],
         u: &[f64],
-        sought: &mut Sought,
+        progress: &mut SearchProgress,
     ) -> Result<Plan, bool> {
         let found = self.led_by(plan, t, x, u).ok().and_then(|(moved, at)| {
-            self.step_on(moved.as_ref().unwrap_or(plan), (t + self.period, &at), u, sought)
+            self.step_on(moved.as_ref().unwrap_or(plan), (t + self.period, &at), u, progress)
         });
         let found = match found {
             Some(Ok(plan)) => {
-                self.behind(&plan, t, x, u).map(|witness| Plan { witness, ..plan }).map_err(|_| None)
+                self.behind(&plan, t, x, u).map(|backup_plan| Plan { backup_plan, ..plan }).map_err(|_| None)
             }
             Some(Err(descent)) => Err(Some(descent)),
             None => Err(None),
         };
         found.map_err(|descent| {
-            sought.next(self.programs, descent.as_ref().map(|(descent, times)| (descent, &times[..])))
+            progress.next(self.programs, descent.as_ref().map(|(descent, times)| (descent, &times[..])))
         })
     }
 
@@ -127,12 +128,18 @@ impl Planner<'_> {
     /// # Errors
     ///
     /// Whether the search goes on, where these steps lead to no plan.
-    pub(crate) fn regained(&self, plan: &Plan, t: f64, x: &[f64], sought: &mut Sought) -> Result<Plan, bool> {
-        let rest = plan.brake.as_ref().map(|brake| brake.input.clone()).unwrap_or_default();
-        match self.step_on(plan, (t, x), &rest, sought) {
+    pub(crate) fn regained(
+        &self,
+        plan: &Plan,
+        t: f64,
+        x: &[f64],
+        progress: &mut SearchProgress,
+    ) -> Result<Plan, bool> {
+        let equilibrium = plan.stopping.as_ref().map(|stopping| stopping.input.clone()).unwrap_or_default();
+        match self.step_on(plan, (t, x), &equilibrium, progress) {
             Some(Ok(plan)) => Ok(plan),
-            Some(Err((descent, times))) => Err(sought.next(self.programs, Some((&descent, &times)))),
-            None => Err(sought.next(self.programs, None)),
+            Some(Err((descent, times))) => Err(progress.next(self.programs, Some((&descent, &times)))),
+            None => Err(progress.next(self.programs, None)),
         }
     }
 
@@ -142,7 +149,7 @@ impl Planner<'_> {
         plan: &Plan,
         (t, x): (f64, &[f64]),
         wanted: &[f64],
-        sought: &Sought,
+        progress: &SearchProgress,
     ) -> Option<Result<Plan, (Descent, Vec<f64>)>> {
         let paced = Self { period: self.pace(), ..*self };
         let margin = |r: &Requirement<'_>| match r.is_limit {
@@ -153,7 +160,7 @@ impl Planner<'_> {
             paced.requirements.iter().map(|r| Requirement { margin: margin(r), ..*r }).collect();
         let (hold, times) = paced.grid(t, &requirements, (HOLDS, UNDATED), None)?;
         let sketch = paced.model(paced.resolved(x, hold, RESOLVED[0])?);
-        let (reference, brake) = (plan.reference.as_ref()?, plan.brake.as_ref()?);
+        let (reference, stopping) = (plan.reference.as_ref()?, plan.stopping.as_ref()?);
         let (mut at, mut u, last) = (x.to_vec(), vec![0.0; paced.dims[1]], paced.last(t));
         let mut led = |law: Law<'_>| {
             let mut inputs: Vec<Vec<f64>> = Vec::with_capacity(times.len());
@@ -162,25 +169,25 @@ impl Planner<'_> {
                 sketch.flow(&mut at, &u, hold[1] - hold[0]);
                 inputs.push(u.clone());
             }
-            inputs.push(brake.input.clone());
+            inputs.push(stopping.input.clone());
             inputs
         };
-        let inputs = match sought.guess as usize {
-            _ if !sought.inputs.is_empty() => {
-                let before = Witness { inputs: sought.inputs.clone(), ..Witness::default() };
+        let inputs = match progress.guess as usize {
+            _ if !progress.inputs.is_empty() => {
+                let before = BackupPlan { inputs: progress.inputs.clone(), ..BackupPlan::default() };
                 let mean = |hold: &[f64]| before.mean(hold[0], hold[1])[..paced.dims[1]].to_vec();
-                times.windows(2).map(mean).chain([brake.input.clone()]).collect()
+                times.windows(2).map(mean).chain([stopping.input.clone()]).collect()
             }
             0 => led(&|t, x, u| match reference.hold_at(t, 1e-3 * paced.period) {
                 Some(k) => reference.input(&sketch, k, t, x, u),
-                None => brake.input(&sketch, x, u),
+                None => stopping.input(&sketch, x, u),
             }),
             k if k <= WANTED.len() => led(&|at, x, u| match at < t + WANTED[k - 1] * (last - t) {
                 true => u.copy_from_slice(wanted),
-                false => brake.input(&sketch, x, u),
+                false => stopping.input(&sketch, x, u),
             }),
             k => paced
-                .guesses(&sketch, &Guide(Some((**brake).clone())), x, &times)
+                .guesses(&sketch, &Guide(Some((**stopping).clone())), x, &times)
                 .nth(k - 1 - WANTED.len())?,
         };
         let mut search = Search {
@@ -190,7 +197,7 @@ impl Planner<'_> {
             times: &times,
             x,
             size: paced.size,
-            rests: true,
+            at_equilibrium: true,
             quick: true,
             sizes: vec![0.0; self.requirements.len()],
         };
@@ -208,7 +215,7 @@ impl Planner<'_> {
             let found = Plan { reference: Some(Arc::new(reference)), ..plan.clone() };
             let grid = Grid { period: paced.period, even: true };
             match paced.walk(&found, 1.0, grid, (t, x), None, true) {
-                Ok(witness) => return Some(Ok(Plan { witness, ..found })),
+                Ok(backup_plan) => return Some(Ok(Plan { backup_plan, ..found })),
                 // What is broken between the nodes is asked for with more margin at them.
                 Err(Failure::Broken { barrier, slack, .. }) => search.tighten(barrier, slack, &descent.best),
                 Err(_) => break,

@@ -56,8 +56,8 @@ words! {
         /// [`Infeasible::Report`].
         #[default]
         Report = "report",
-        /// [`Infeasible::Soonest`].
-        Soonest = "earliest",
+        /// [`Infeasible::Earliest`].
+        Earliest = "earliest",
     }
 }
 
@@ -201,7 +201,7 @@ impl BarrierSection {
             },
             infeasible: match self.when_infeasible {
                 InfeasibleName::Report => Infeasible::Report,
-                InfeasibleName::Soonest => Infeasible::Soonest,
+                InfeasibleName::Earliest => Infeasible::Earliest,
             },
             rate: self.rate.given(),
             rates,

@@ -318,7 +318,7 @@ fn the_car_with_jerk_meets_its_deadline() {
     }
 }
 
-/// A bound of a state of one's own model is the expression that it stands for.
+/// A bound of a state of a custom model is the expression that it stands for.
 #[test]
 fn bounds_of_states_are_expressions() {
     let stepped = |barrier: &str| {

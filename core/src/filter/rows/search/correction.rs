@@ -7,9 +7,9 @@
 //! a correction or two. The last G(u_k) is the answer once ρ times its way is a tenth of what counts as met: the next
 //! correction would not be longer.
 //!
-//! Only rows that are active or violated are linearised on the way, the others at the end. The answer stands if every row
-//! holds, no other is in sight aside, and the last input leads to it too, or is no nearer to u_ref, or is too near for the
-//! rows to bend on the way there. Else the search begins anew from its two guesses.
+//! Only rows that are active or violated are linearised on the way, the others at the end. The answer is accepted if every
+//! row holds, no other is in sight sideways, and the last input leads to it too, or is no nearer to u_ref, or is too near
+//! for the rows to curve on the way there. Else the search starts over from its two guesses.
 
 use super::{CONTRACTION, FAR, Linearised, MET, PeriodProblem, SAME, active};
 use crate::MAX_INPUTS;
@@ -122,7 +122,7 @@ impl PeriodProblem<'_> {
             };
             let settled = distance <= FAR * limit
                 && is_sole
-                && !against.is_some_and(|i| self.is_nearer_aside(u, (i, ratio <= CONTRACTION), at));
+                && !against.is_some_and(|i| self.is_nearer_sideways(u, (i, ratio <= CONTRACTION), at));
             return settled.then_some(Solution { iterations, ..solution });
         }
         None

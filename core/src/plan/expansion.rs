@@ -1,26 +1,26 @@
-//! Arithmetic of [`Course`]s: polynomials in the time since their begin.
+//! Arithmetic of [`Expansion`]s: polynomials in the time since their begin.
 
 use crate::elementary::powf;
 use crate::interval::Interval;
-use crate::lie::{COURSE, Course, CourseOver};
+use crate::lie::{EXPANSION_ORDERS, Expansion, ExpansionOver};
 use crate::scalar::Scalar;
 
 /// Highest power.
-const DEGREE: usize = COURSE - 1;
+const DEGREE: usize = EXPANSION_ORDERS - 1;
 
 /// The value after `dt` s.
-pub(super) fn at(course: &Course, dt: f64) -> f64 {
-    course.iter().rev().fold(0.0, |sum, c| sum * dt + c)
+pub(super) fn at(expansion: &Expansion, dt: f64) -> f64 {
+    expansion.iter().rev().fold(0.0, |sum, c| sum * dt + c)
 }
 
 /// The derivative after `dt` s, per second.
-pub(super) fn slope(course: &Course, dt: f64) -> f64 {
-    (1..COURSE).rev().fold(0.0, |sum, k| sum * dt + k as f64 * course[k])
+pub(super) fn slope(expansion: &Expansion, dt: f64) -> f64 {
+    (1..EXPANSION_ORDERS).rev().fold(0.0, |sum, k| sum * dt + k as f64 * expansion[k])
 }
 
 /// The same polynomial in the time from `dt` s later on.
-pub(super) fn shifted(course: &Course, dt: f64) -> Course {
-    let mut c = *course;
+pub(super) fn shifted(expansion: &Expansion, dt: f64) -> Expansion {
+    let mut c = *expansion;
     for first in 0..DEGREE {
         for k in (first..DEGREE).rev() {
             c[k] += c[k + 1] * dt;
@@ -30,17 +30,17 @@ pub(super) fn shifted(course: &Course, dt: f64) -> Course {
 }
 
 /// The sum of the last two terms after `dt` s.
-pub(super) fn last_terms(course: &Course, dt: f64) -> f64 {
+pub(super) fn last_terms(expansion: &Expansion, dt: f64) -> f64 {
     let power = (0..DEGREE - 1).fold(1.0, |power, _| power * dt);
-    power * (course[DEGREE - 1].abs() + course[DEGREE].abs() * dt)
+    power * (expansion[DEGREE - 1].abs() + expansion[DEGREE].abs() * dt)
 }
 
 /// The longest time, up to `most` s, after which neither of the last two terms is larger than `allowed`.
-pub(super) fn reach(course: &Course, allowed: f64, most: f64) -> f64 {
-    if last_terms(course, most) <= allowed {
+pub(super) fn reach(expansion: &Expansion, allowed: f64, most: f64) -> f64 {
+    if last_terms(expansion, most) <= allowed {
         return most;
     }
-    let until = |k: usize| powf(allowed / course[k].abs(), 1.0 / k as f64);
+    let until = |k: usize| powf(allowed / expansion[k].abs(), 1.0 / k as f64);
     most.min(until(DEGREE - 1)).min(until(DEGREE))
 }
 
@@ -48,8 +48,8 @@ pub(super) fn reach(course: &Course, allowed: f64, most: f64) -> f64 {
 /// `b_j = Σ_{k ≤ j} C(j, k) / C(n, k) a_k` with a_k = c_k dtᵏ.
 ///
 /// Source: G. Farin, *Curves and Surfaces for CAGD*, section 6.1 (convex hull property).
-pub(super) fn least(course: &Course, dt: f64) -> f64 {
-    let (mut scaled, mut power) = (*course, 1.0);
+pub(super) fn least(expansion: &Expansion, dt: f64) -> f64 {
+    let (mut scaled, mut power) = (*expansion, 1.0);
     for (scaled, all) in scaled.iter_mut().zip(CHOICES[DEGREE]) {
         *scaled *= power / all;
         power *= dt;
@@ -58,28 +58,30 @@ pub(super) fn least(course: &Course, dt: f64) -> f64 {
         let terms = CHOICES[j].iter().zip(&scaled).take(j + 1);
         terms.map(|(choices, a)| choices * a).sum()
     };
-    (0..COURSE).map(coefficient).fold(f64::INFINITY, f64::min)
+    (0..EXPANSION_ORDERS).map(coefficient).fold(f64::INFINITY, f64::min)
 }
 
-/// The coefficients of the course from anywhere within `dt` s on: each is that of the middle, give or take what the higher
-/// ones change it by within half of `dt`.
-pub(super) fn over(course: &Course, dt: f64) -> CourseOver {
-    let (middle, half) = (shifted(course, 0.5 * dt), 0.5 * dt);
+/// The coefficients of the expansion from anywhere within `dt` s on: each is that of the middle, give or take what the
+/// higher ones change it by within half of `dt`.
+pub(super) fn over(expansion: &Expansion, dt: f64) -> ExpansionOver {
+    let (middle, half) = (shifted(expansion, 0.5 * dt), 0.5 * dt);
     core::array::from_fn(|k| {
-        let wide = (k + 1..COURSE).rev().fold(0.0, |sum, j| (sum + CHOICES[j][k] * middle[j].abs()) * half);
+        let wide = (k + 1..EXPANSION_ORDERS)
+            .rev()
+            .fold(0.0, |sum, j| (sum + CHOICES[j][k] * middle[j].abs()) * half);
         Interval::new(middle[k] - wide, middle[k] + wide)
     })
 }
 
-/// The most that the course of a state misses its rate by within `dt` s: the coefficients of the one are within `course`, the
-/// first of the other within `rate`.
+/// The most that the expansion of a state misses its rate by within `dt` s: the coefficients of the one are within
+/// `expansion`, the first of the other within `rate`.
 ///
 /// Their difference r has no coefficients at the begin, so r(τ) = τᵏ r_k(s) at an s in 0 ... τ for every k up to where the rate
 /// is smooth: Taylor's theorem with the remainder of Lagrange. The least of these bounds counts.
-pub(super) fn missed(rate: &[Interval], course: &CourseOver, dt: f64) -> f64 {
+pub(super) fn missed(rate: &[Interval], expansion: &ExpansionOver, dt: f64) -> f64 {
     let (mut least, mut power) = (f64::INFINITY, 1.0);
     for (k, rate) in rate.iter().enumerate() {
-        let differs = (*rate - course[k + 1] * (k + 1) as f64).abs().high;
+        let differs = (*rate - expansion[k + 1] * (k + 1) as f64).abs().high;
         least = least.min(power * differs);
         power *= dt;
     }
@@ -87,10 +89,10 @@ pub(super) fn missed(rate: &[Interval], course: &CourseOver, dt: f64) -> f64 {
 }
 
 /// C(n, k) at `[n][k]`.
-const CHOICES: [[f64; COURSE]; COURSE] = {
-    let mut table = [[0.0; COURSE]; COURSE];
+const CHOICES: [[f64; EXPANSION_ORDERS]; EXPANSION_ORDERS] = {
+    let mut table = [[0.0; EXPANSION_ORDERS]; EXPANSION_ORDERS];
     let mut n = 0;
-    while n < COURSE {
+    while n < EXPANSION_ORDERS {
         table[n][0] = 1.0;
         let mut k = 1;
         while k <= n {
@@ -107,7 +109,7 @@ mod tests {
     use super::*;
 
     /// (1 − τ)⁹ and others: known values, slopes and bounds.
-    const FALLS: Course = [1.0, -9.0, 36.0, -84.0, 126.0, -126.0, 84.0, -36.0, 9.0, -1.0];
+    const FALLS: Expansion = [1.0, -9.0, 36.0, -84.0, 126.0, -126.0, 84.0, -36.0, 9.0, -1.0];
 
     #[test]
     fn polynomials_are_what_they_are() {
@@ -124,7 +126,7 @@ mod tests {
     fn no_value_is_below_the_least_coefficient() {
         // All coefficients of (1 - τ)⁹ in the basis of Bernstein on [0, 1] are 0 but the first.
         assert!(least(&FALLS, 1.0).abs() < 1e-12);
-        let mut wave = [0.0; COURSE];
+        let mut wave = [0.0; EXPANSION_ORDERS];
         for seed in 0..200_u64 {
             for (k, c) in wave.iter_mut().enumerate() {
                 *c = ((seed * 7919 + k as u64 * 104_729) % 1009) as f64 / 500.0 - 1.0;

@@ -7,26 +7,26 @@ use crate::MAX_INPUTS;
 /// A list of held inputs that meets every requirement, from a state on.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Witness {
-    /// The end of each hold in s, and its input. The last is held for ever where the plant is at rest under it.
+pub struct BackupPlan {
+    /// The end of each hold in s, and its input. The last is held for ever where the plant is at an equilibrium under it.
     pub inputs: Vec<(f64, [f64; MAX_INPUTS])>,
-    /// The time in s until which every requirement is met: infinite where the plan ends at rest, else its end.
+    /// The time in s until which every requirement is met: infinite where the plan ends at an equilibrium, else its end.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub until: f64,
     /// The place on the way where h − margin is least.
     pub tightest: Option<Tightest>,
-    /// The largest rate of each state on the way, and on the way of the plan before it: what rest is small against. It never
-    /// falls, so what was a rest stays one.
+    /// The largest rate of each state on the way, and on the way of the plan before it: what an equilibrium's rates are
+    /// small against. It never falls, so what was an equilibrium stays one.
     pub(super) rates: Vec<f64>,
     /// The largest input on the way after the first hold, as a part of its bounds, 0 to 1.
     pub effort: f64,
     /// Whether its holds end at samples in the period of the first.
-    pub(crate) is_even: bool,
+    pub(crate) is_uniform: bool,
     /// The pieces of its walk.
     pub(super) pieces: u32,
 }
 
-impl Witness {
+impl BackupPlan {
     /// The mean input from `t` until `end` > `t`.
     pub(super) fn mean(&self, t: f64, end: f64) -> [f64; MAX_INPUTS] {
         let (mut mean, mut at) = ([0.0; MAX_INPUTS], t);

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use punctual_core::filter::{Filter, Plans};
-use punctual_core::plan::{Failure, Witness};
+use punctual_core::plan::{BackupPlan, Failure};
 use punctual_cosim::error::Error;
 use punctual_fmu::configuration::{FilterConfiguration, UNBOUNDED};
 use serde::Serialize;
@@ -14,7 +14,7 @@ use crate::output::{self, number, number_above, number_below};
 
 /// The finding on plans from the start.
 #[derive(Serialize)]
-pub(super) struct WitnessReport {
+pub(super) struct BackupPlanReport {
     /// Whether a plan was found and checked.
     pub(super) found: bool,
     /// Whether there certainly is none.
@@ -63,13 +63,13 @@ pub(super) fn find(
     x0: &[f64],
     run: Option<&LoopReport>,
     out: Option<&Path>,
-) -> Result<Option<WitnessReport>, Error> {
+) -> Result<Option<BackupPlanReport>, Error> {
     let (inputs, x0) = (c.plant.inputs(), &c.measured(x0)[..]);
     let bounds = |name: &str| c.bounds.get(name).copied().filter(|b| b.iter().all(|b| b.abs() < UNBOUNDED));
     if c.commanded().iter().any(|signal| c.limits(&signal.name).is_none()) {
         return Ok(None);
     }
-    let refused = |reason: String| WitnessReport {
+    let refused = |reason: String| BackupPlanReport {
         found: false,
         vain: false,
         reason: Some(reason),
@@ -88,27 +88,27 @@ pub(super) fn find(
     let Some(planning) = filter.planning() else { return Ok(None) };
     let t = c.experiment.start_time;
     let unit = |i: usize| c.barrier[i].unit(&c.plant);
-    let plan = |witness: &Witness| PlanReport {
-        at_equilibrium_from: witness
+    let plan = |backup_plan: &BackupPlan| PlanReport {
+        at_equilibrium_from: backup_plan
             .until
             .is_infinite()
-            .then(|| witness.inputs.last().map_or(t, |(end, _)| *end)),
-        until: Some(witness.until).filter(|until| until.is_finite()),
+            .then(|| backup_plan.inputs.last().map_or(t, |(end, _)| *end)),
+        until: Some(backup_plan.until).filter(|until| until.is_finite()),
         inputs: inputs
             .iter()
             .enumerate()
             .map(|(i, input)| {
-                let peak = witness.inputs.iter().fold(0.0_f64, |peak, (_, u)| peak.max(u[i].abs()));
+                let peak = backup_plan.inputs.iter().fold(0.0_f64, |peak, (_, u)| peak.max(u[i].abs()));
                 let given = bounds(&input.name).unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
                 (input.name.clone(), peak, input.unit.clone(), given)
             })
             .collect(),
-        tightest: witness
+        tightest: backup_plan
             .tightest
             .map(|at| (c.barrier[at.barrier].name.clone(), at.time, at.slack, unit(at.barrier))),
     };
     let has_deadline = c.barrier.iter().any(|barrier| barrier.deadline.is_some());
-    let (configured, soonest) = match has_deadline {
+    let (configured, earliest) = match has_deadline {
         true => planning.appraise(t, x0, Plans::LONGEST),
         false => (planning.plan_from(t, x0, 1.0), None),
     };
@@ -124,20 +124,20 @@ pub(super) fn find(
         });
         given.collect::<Vec<_>>()
     };
-    let shown = configured.as_ref().ok().or(soonest.as_ref().map(|(_, witness)| witness));
+    let shown = configured.as_ref().ok().or(earliest.as_ref().map(|(_, backup_plan)| backup_plan));
     let files = match (out, shown) {
-        (Some(folder), Some(witness)) => map::plan(c, (&filter, witness), (t, x0), folder)?,
+        (Some(folder), Some(backup_plan)) => map::plan(c, (&filter, backup_plan), (t, x0), folder)?,
         _ => Vec::new(),
     };
-    Ok(Some(WitnessReport {
+    Ok(Some(BackupPlanReport {
         found: configured.is_ok(),
         vain: matches!(configured, Err(Failure::Apart { .. })),
         reason,
         in_motion: if configured.is_err() { in_motion(c, x0) } else { None },
         left_out,
         has_deadline,
-        earliest_factor: soonest.as_ref().map(|(factor, _)| *factor),
-        earliest: soonest.as_ref().map_or(Vec::new(), |(factor, _)| deadlines(*factor)),
+        earliest_factor: earliest.as_ref().map(|(factor, _)| *factor),
+        earliest: earliest.as_ref().map_or(Vec::new(), |(factor, _)| deadlines(*factor)),
         plan: shown.map(plan),
         files,
     }))
@@ -151,8 +151,8 @@ pub(super) fn in_time(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<Stri
     let (t, x0) = (c.experiment.start_time, &c.measured(x0)[..]);
     let line = match planning.later_deadline(t, x0, Plans::LONGEST) {
         Some((factor, _)) => {
-            let soonest = c.barrier.iter().filter_map(|b| Some((&b.name, factor * b.deadline?)));
-            let named: Vec<_> = soonest.map(|(name, at)| format!("{name} {} s", number(at))).collect();
+            let earliest = c.barrier.iter().filter_map(|b| Some((&b.name, factor * b.deadline?)));
+            let named: Vec<_> = earliest.map(|(name, at)| format!("{name} {} s", number(at))).collect();
             format!("earliest deadline with a plan: {}", named.join(", "))
         }
         None if matches!(planning.plan_from(t, x0, 1.0), Err(Failure::Apart { .. })) => return Ok(None),
@@ -177,7 +177,7 @@ fn in_motion(c: &FilterConfiguration, x0: &[f64]) -> Option<[f64; 2]> {
     until.is_finite().then_some([horizon, until])
 }
 
-impl WitnessReport {
+impl BackupPlanReport {
     /// Whether the plan keeps the promise of `barrier`.
     pub(super) fn keeps(&self, barrier: &str) -> bool {
         self.found && self.covers(barrier)
@@ -194,7 +194,7 @@ impl WitnessReport {
     }
 
     /// The earliest deadline of `barrier` in s with a plan.
-    pub(super) fn soonest(&self, barrier: &str) -> Option<f64> {
+    pub(super) fn earliest_deadline(&self, barrier: &str) -> Option<f64> {
         self.earliest.iter().find(|(name, _)| name == barrier).map(|(_, deadline)| *deadline)
     }
 
@@ -221,13 +221,13 @@ impl WitnessReport {
         if !self.left_out.is_empty() {
             lines.push(format!("not promised from there, and not in the plan: {}", self.left_out.join(", ")));
         }
-        let soonest: Vec<_> = self
+        let earliest: Vec<_> = self
             .earliest
             .iter()
             .map(|(name, deadline)| format!("{name} {} s", number_above(*deadline)))
             .collect();
-        if !soonest.is_empty() {
-            lines.push(format!("earliest deadline with a plan: {}", soonest.join(", ")));
+        if !earliest.is_empty() {
+            lines.push(format!("earliest deadline with a plan: {}", earliest.join(", ")));
         } else if self.has_deadline && !self.found && !self.vain && self.plan.is_none() {
             lines.push(format!("none was found for deadlines up to {} times as long either", Plans::LONGEST));
         }

@@ -1,4 +1,4 @@
-//! One active row, to its bend: the usual step.
+//! One active row with its curvature: the usual step.
 //!
 //! Let r(u) ≥ 0 be a row over the period, and let no other row and no bound be active. The answer then is where
 //!
@@ -13,27 +13,28 @@
 //! and faster. The last is taken once the next, shorter in the same ratio, would be a tenth of what counts as met.
 //!
 //! It begins at the answer of the pointwise row, and H with the change of ∇r from u_ref to there. Where the sample before
-//! has left its H ([`Bend`]), it begins at u_ref with that, and is there in a step or two: what H s misses the change of ∇r by
+//! has left its H ([`Curvature`]), it begins at u_ref with that, and is there in a step or two: what H s misses the change of ∇r by
 //! tells how far it has gone stale. An old H never makes an answer, it only shortens the way to it.
 //!
-//! The answer stands under the terms of [`correction`](super::correction): the rows are all but affine from u_ref to there, every other row
-//! holds, and no other answer is in sight. λH, without a unit, is how far the normal turns on the way from u_ref. What r and
-//! ∇r at u_ref miss those at the answer by tells it too. A row that turns further stands too where it is curved inwards: where no
-//! eigenvalue of λH is large and positive, the quadratic has one answer, and what r and ∇r at u_ref miss *its* values by is small.
-//! So bends the row of a vehicle that heads for its goal over a long period. Where the answer goes on from that of the sample before, it is
-//! looked around for others every [`GOES_ON`]th time only.
+//! The answer is accepted under the terms of [`correction`](super::correction): the rows are all but affine from u_ref to
+//! there, every other row holds, and no other answer is in sight. λH, without a unit, is how far the normal turns on the
+//! way from u_ref. What r and ∇r at u_ref miss those at the answer by tells it too. A row that turns further is accepted
+//! too where it is curved inwards: where no eigenvalue of λH is large and positive, the quadratic has one answer, and what
+//! r and ∇r at u_ref miss *its* values by is small. So curves the row of a vehicle that heads for its goal over a long
+//! period. Where the answer goes on from that of the sample before, it is looked around for others every [`GOES_ON`]th time
+//! only.
 
 use super::correction::{CONVERGING, CORRECTIONS, SKIPPED};
 use super::{CONTRACTION, FAR, Linearised, MET, PeriodProblem, SAME, norm};
 use crate::qp::{Outcome, Row, RowSet, Solution, Solver, Workspace};
 use crate::{MAX_INPUTS, elementary};
 
-/// The least square of the part of a step aside, as a part of the step's, for it to show how the row bends aside.
-const ASIDE_OF_STEP: f64 = 0.05;
+/// The least square of the part of a step sideways, as a part of the step's, for it to show how the row curves sideways.
+const SIDEWAYS_OF_STEP: f64 = 0.05;
 /// A step over the product of the two before it with the turn of the normal per distance, at most: three to four times what
-/// vehicles show, over a third of what counts as met. Over what a kept bend is seen to be off by, as much.
+/// vehicles show, over a third of what counts as met. Over what a kept curvature is seen to be off by, as much.
 const SECANT: f64 = 30.0;
-/// The shortest step, as a part of the input, that shows a bend beyond round-off.
+/// The shortest step, as a part of the input, that shows a curvature beyond round-off.
 const TELLING: f64 = 1e-7;
 /// The next change of λ in Newton's method, as a part of it, that is left out: 3/2 λH times the square of the last one.
 const ROOT: f64 = SKIPPED * MET;
@@ -42,15 +43,15 @@ const MULTIPLIER_STEPS: usize = 12;
 
 /// Samples in a row whose answers go on from the one before without a look around for others.
 const GOES_ON: u32 = 8;
-/// The most inputs with which a row is searched to its bend.
+/// The most inputs with which a row is searched with its curvature.
 const INPUTS: usize = 3;
 
 type Matrix<const M: usize> = [[f64; M]; M];
 
-/// How the only active row of a sample bends: the memory from which the search of the next sample begins.
+/// How the only active row of a sample curves: the memory from which the search of the next sample begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Bend {
+pub struct Curvature {
     /// The number of the barrier that the row belongs to.
     pub barrier: u32,
     /// Second derivatives of the row by the inputs, for each second of the period, in `[h]`/(sⁿ⁺¹ · unit of u²): of
@@ -59,11 +60,11 @@ pub struct Bend {
     pub hessian: [f64; INPUTS * (INPUTS + 1) / 2],
     /// Samples since other answers were looked for, from 8 on: the next one looks.
     pub looked: u32,
-    /// Samples since a step aside of the way from u_ref has shown how the row bends there; `None` where none ever has.
-    pub aside: Option<u32>,
+    /// Samples since a step sideways of the line from u_ref has shown how the row curves there; `None` where none ever has.
+    pub sideways: Option<u32>,
 }
 
-impl Bend {
+impl Curvature {
     /// The second derivatives over a period of so many `seconds`.
     #[inline(always)]
     fn over<const M: usize>(&self, seconds: f64) -> Matrix<M> {
@@ -130,10 +131,10 @@ impl<const M: usize> Bent<M> {
         }
     }
 
-    /// Changes the Hessian along a way aside of an answer by what makes the value there and on the opposite side sum up to
-    /// `values`. Returns whether that is a number: where not, nothing has been learned.
+    /// Changes the Hessian along a direction sideways of an answer by what makes the value there and on the opposite side
+    /// sum up to `values`. Returns whether that is a number: where not, nothing has been learned.
     #[inline(always)]
-    fn learn_aside(&mut self, way: &[f64], values: f64) -> bool {
+    fn learn_sideways(&mut self, way: &[f64], values: f64) -> bool {
         let Some(s) = way.first_chunk::<M>() else { return false };
         let rest = values - product(s, &self.turn(s));
         if !rest.is_finite() {
@@ -155,7 +156,7 @@ impl<const M: usize> Bent<M> {
             core::array::from_fn(|j| if i == j { most } else { 0.0 } - lambda * self.hessian[i][j])
         });
         for k in 0..M {
-            // Not-a-number is not positive.
+            // NaN is not positive.
             if !matches!(left[k][k], f64::MIN_POSITIVE..f64::INFINITY) {
                 return false;
             }
@@ -176,16 +177,16 @@ impl<const M: usize> Bent<M> {
         /// The largest square of λH.
         const SMALL: f64 = CONVERGING * CONVERGING;
         // As seen from u_ref, it is value + cᵀw + ½ wᵀHw of the way w, and (K) is w = λ (I − λH)⁻¹ c.
-        let bend = self.turn(back);
-        let c: [f64; M] = core::array::from_fn(|i| self.normal[i] + bend[i]);
-        let middle = core::array::from_fn(|i| self.normal[i] + 0.5 * bend[i]);
+        let curvature = self.turn(back);
+        let c: [f64; M] = core::array::from_fn(|i| self.normal[i] + curvature[i]);
+        let middle = core::array::from_fn(|i| self.normal[i] + 0.5 * curvature[i]);
         let value = self.value + product(back, &middle);
         let inverse = Resolvent::of(&self.hessian, &c);
         let size: f64 = self.hessian.iter().map(|h| product(h, h)).sum();
         // The first terms in λ are value + λ cᵀc + 3/2 λ² cᵀHc.
         let (square, bent) = (product(&c, &c), product(&c, &self.turn(&c)));
         let mut lambda = -value * square / (square * square - 1.5 * value * bent);
-        // Not-a-number is not small.
+        // NaN is not small.
         let is_small = |turn: f64| matches!(turn, 0.0..=SMALL);
         if !is_small(lambda * lambda * size) {
             // Where the row is curved inwards what is missing is concave in λ. From the first term on, which is too small, λ grows.
@@ -269,7 +270,7 @@ impl<const M: usize> Resolvent<M> {
 impl PeriodProblem<'_> {
     /// The answer, written to `u`, where one hard row alone is active in it and is all but affine between u_ref and
     /// there. `None`, with `u` as it may be, where it is not known to be so.
-    pub(super) fn bent_row(
+    pub(super) fn curved_row(
         &self,
         u: &mut [f64],
         last: Option<&[f64]>,
@@ -308,13 +309,13 @@ impl PeriodProblem<'_> {
         if at_reference.value >= -MET * (at_reference.terms + moved) {
             return None;
         }
-        // From the answer of the pointwise row, or of the row with the bend that it had, to that of the row itself.
+        // From the answer of the pointwise row, or of the row with the curvature that it had, to that of the row itself.
         let mut row = Bent { value: at_reference.value, normal, hessian: [[0.0; M]; M] };
         let mut step: [f64; M] = core::array::from_fn(|i| u[i] - u_ref[i]);
         let (mut length, mut ratio) = (f64::INFINITY, 0.0_f64);
-        let mut kept = self.bend.filter(|bend| bend.barrier as usize == requirement.barrier);
-        if let Some(bend) = kept {
-            row.hessian = bend.over(requirement.ahead);
+        let mut kept = self.curvature.filter(|curvature| curvature.barrier as usize == requirement.barrier);
+        if let Some(curvature) = kept {
+            row.hessian = curvature.over(requirement.ahead);
             let (way, lambda) = row.nearest(&[0.0; M]).unwrap_or(([0.0; M], 0.0));
             let target: [f64; M] = core::array::from_fn(|i| u_ref[i] + way[i]);
             if lambda > 0.0 && self.bounds.contain_all(&target) {
@@ -324,7 +325,7 @@ impl PeriodProblem<'_> {
             }
         }
         let (mut way, mut turned) = ([0.0; M], [0.0; M]);
-        let (mut bends_aside, mut rounds) = (false, 0);
+        let (mut curved_sideways, mut rounds) = (false, 0);
         let (lambda, turn) = loop {
             let here = self.weighted(requirement, &u, at.evaluations)?;
             let before = core::mem::replace(&mut row.normal, *here.normal.first_chunk()?);
@@ -334,13 +335,13 @@ impl PeriodProblem<'_> {
             if rounds == 0 {
                 (way, turned) = (step, change);
             } else {
-                // The part of the step aside of the way from u_ref, with the part of the turn that is its own.
+                // The part of the step sideways of the line from u_ref, with the part of the turn that is its own.
                 let along = product(&step, &way) / product(&way, &way);
-                let aside = core::array::from_fn(|i| step[i] - along * way[i]);
+                let sideways = core::array::from_fn(|i| step[i] - along * way[i]);
                 let tells = largest(&step) >= TELLING * 1.0_f64.max(largest(&u));
-                if tells && product(&aside, &aside) >= ASIDE_OF_STEP * product(&step, &step) {
-                    row.learn(&aside, &core::array::from_fn(|i| change[i] - along * turned[i]));
-                    bends_aside = true;
+                if tells && product(&sideways, &sideways) >= SIDEWAYS_OF_STEP * product(&step, &step) {
+                    row.learn(&sideways, &core::array::from_fn(|i| change[i] - along * turned[i]));
+                    curved_sideways = true;
                 }
             }
             let known = row.turn(&step);
@@ -350,7 +351,7 @@ impl PeriodProblem<'_> {
             let lambda;
             (step, lambda) = row.nearest(&back)?;
             let target: [f64; M] = core::array::from_fn(|i| u[i] + step[i]);
-            // Not-a-number is not within bounds.
+            // NaN is not within bounds.
             if !self.bounds.contain_all(&target) || lambda <= 0.0 {
                 return None;
             }
@@ -360,19 +361,20 @@ impl PeriodProblem<'_> {
             length = largest(&step);
             let turn = lambda * elementary::sqrt(row.hessian.iter().map(|h| product(h, h)).sum());
             let next = match kept {
-                // A step shows by how much the bend along it is off. Aside, where none has shown it, the bend is off by that for
-                // each sample that has passed.
-                Some(bend) => {
+                // A step shows by how much the curvature along it is off. Sideways, where none has shown it, the curvature
+                // is off by that for each sample that has passed.
+                Some(curvature) => {
                     let off = lambda * off;
-                    let aside = match bend.aside {
-                        _ if bends_aside => off,
+                    let sideways = match curvature.sideways {
+                        _ if curved_sideways => off,
                         Some(samples) => turn.min(off * f64::from(samples)),
                         None => turn,
                     };
-                    SECANT * (off + aside) * length
+                    SECANT * (off + sideways) * length
                 }
-                // Methods of secants: a step is as the product of the two before it, where they have shown how the row bends.
-                None if bends_aside => {
+                // Methods of secants: a step is as the product of the two before it, where they have shown how the row
+                // curves.
+                None if curved_sideways => {
                     SECANT * turn * length * before_length / elementary::sqrt(product(&back, &back))
                 }
                 None => shortened.max(turn) * length / SKIPPED,
@@ -388,20 +390,20 @@ impl PeriodProblem<'_> {
             // The first two steps tell by how much the normal turns, where its turn was not known.
             ratio = if rounds == 2 && kept.is_none() { shortened } else { ratio };
         };
-        // How far the row bends between u_ref and the answer, and how far its normal turns there, as parts of themselves.
+        // How far the row curves between u_ref and the answer, and how far its normal turns there, as parts of themselves.
         let square = product(&row.normal, &row.normal);
         let missed = (at_reference.value + lambda * square).abs() / (lambda * square);
         let turned: [f64; M] = core::array::from_fn(|i| row.normal[i] - normal[i]);
-        let bend = missed.max(elementary::sqrt(product(&turned, &turned) / square));
-        let mut ratio = ratio.max(bend).max(turn);
-        // Not-a-number is no number at most.
+        let curvature = missed.max(elementary::sqrt(product(&turned, &turned) / square));
+        let mut ratio = ratio.max(curvature).max(turn);
+        // NaN fails this comparison.
         if !matches!(ratio, 0.0..=CONVERGING) {
-            // A quadratic that is curved inwards has one answer, however far it bends. What counts is what it misses; and that
-            // the plant does not turn all the way round, which no quadratic sees.
+            // A quadratic that is curved inwards has one answer, however far it curves. What counts is what it misses; and
+            // that the plant does not turn all the way round, which no quadratic sees.
             let way = core::array::from_fn(|i| u[i] - u_ref[i]);
-            let bend = row.turn(&way);
-            let missed = (at_reference.value + lambda * square - 0.5 * product(&way, &bend)).abs();
-            let rest: [f64; M] = core::array::from_fn(|i| turned[i] - bend[i]);
+            let curvature = row.turn(&way);
+            let missed = (at_reference.value + lambda * square - 0.5 * product(&way, &curvature)).abs();
+            let rest: [f64; M] = core::array::from_fn(|i| turned[i] - curvature[i]);
             ratio = (missed / (lambda * square)).max(elementary::sqrt(product(&rest, &rest) / square));
             let is_far = norm(way.iter().copied()) > FAR * 1.0_f64.max(largest(u_ref));
             if is_far || !matches!(ratio, 0.0..=CONTRACTION) || !row.is_curved_inwards(lambda, CONTRACTION) {
@@ -422,9 +424,9 @@ impl PeriodProblem<'_> {
                 return None;
             }
         }
-        let young = kept.filter(|bend| bend.looked < GOES_ON);
+        let young = kept.filter(|curvature| curvature.looked < GOES_ON);
         let goes_on = young.filter(|_| last.is_some_and(|last| self.is_close(last, &u, distance, ratio)));
-        let mut sees_aside = true;
+        let mut sees_sideways = true;
         if goes_on.is_none() {
             let is_sole = match last {
                 Some(last) => {
@@ -433,21 +435,25 @@ impl PeriodProblem<'_> {
                 }
                 None => ratio <= CONTRACTION,
             };
-            let seen_aside = ratio <= CONTRACTION && bends_aside;
-            let learn = |way: &[f64], slacks: f64| sees_aside &= row.learn_aside(way, slacks);
-            if !is_sole || !seen_aside && self.look_aside(&u, (chosen, ratio <= CONTRACTION), at, learn) {
+            let seen_sideways = ratio <= CONTRACTION && curved_sideways;
+            let learn = |way: &[f64], slacks: f64| sees_sideways &= row.learn_sideways(way, slacks);
+            if !is_sole || !seen_sideways && self.look_sideways(&u, (chosen, ratio <= CONTRACTION), at, learn)
+            {
                 return None;
             }
         }
         *out = u;
         qp.note_active(chosen, lambda);
-        // Where the look aside told nothing, as where a bound cut it short, the next sample looks again.
-        let looked = goes_on.map_or(if sees_aside { 0 } else { GOES_ON }, |bend| bend.looked + 1);
-        let passed = || kept.and_then(|bend| bend.aside).map(|samples| samples.saturating_add(1));
-        let aside = if bends_aside { Some(1) } else { passed() };
-        let mut bend = Bend { barrier: requirement.barrier as u32, hessian: [0.0; _], looked, aside };
-        bend.write(&row.hessian, requirement.ahead);
-        *at.bend = Some(bend);
+        // Where the look sideways showed nothing, as where a bound cut it short, the next sample looks again.
+        let looked =
+            goes_on.map_or(if sees_sideways { 0 } else { GOES_ON }, |curvature| curvature.looked + 1);
+        let passed =
+            || kept.and_then(|curvature| curvature.sideways).map(|samples| samples.saturating_add(1));
+        let sideways = if curved_sideways { Some(1) } else { passed() };
+        let mut curvature =
+            Curvature { barrier: requirement.barrier as u32, hessian: [0.0; _], looked, sideways };
+        curvature.write(&row.hessian, requirement.ahead);
+        *at.curvature = Some(curvature);
         Some(Solution { outcome: Outcome::Optimal, solver: Solver::ClosedForm, iterations: 0 })
     }
 
@@ -469,7 +475,7 @@ impl PeriodProblem<'_> {
         furthest
     }
 
-    /// Whether the row `chosen`, with the bend of `hessian` at `last`, leads to the answer `u`.
+    /// Whether the row `chosen`, with the curvature of `hessian` at `last`, leads to the answer `u`.
     #[inline(always)]
     fn leads_to<const M: usize>(
         &self,
@@ -512,7 +518,7 @@ mod tests {
         let u_ref = [-0.8, 0.1];
         let mut answers = [[-1.1, -0.4], [-0.9, -0.2]].map(|u: [f64; 2]| {
             let back = [u_ref[0] - u[0], u_ref[1] - u[1]];
-            let (step, lambda) = inside(u).nearest(&back).expect("a bend that is not large");
+            let (step, lambda) = inside(u).nearest(&back).expect("a curvature that is not large");
             let u = [u[0] + step[0], u[1] + step[1]];
             let Bent { value, normal, .. } = inside(u);
             // A dozen operations on numbers of order 1, and λ to the square of the last change.
@@ -558,15 +564,15 @@ mod tests {
         }
     }
 
-    /// The values on both sides of an answer show the bend on the way between them; what is not known shows nothing.
+    /// The values on both sides of an answer show the curvature on the way between them; what is not known shows nothing.
     #[test]
-    fn a_look_aside_shows_the_bend_on_its_way() {
+    fn a_look_sideways_shows_the_curvature_on_its_way() {
         let mut row = Bent { hessian: [[0.5, 0.2], [0.2, -0.1]], ..inside([0.0; 2]) };
         let before = row.hessian;
-        assert!(!row.learn_aside(&[0.3, -0.1], f64::NAN) && row.hessian == before);
+        assert!(!row.learn_sideways(&[0.3, -0.1], f64::NAN) && row.hessian == before);
         for way in [[0.3, -0.1], [-0.2, 0.7]] {
             let values = product(&way, &inside([0.0; 2]).turn(&way));
-            assert!(row.learn_aside(&way, values));
+            assert!(row.learn_sideways(&way, values));
             assert!((product(&way, &row.turn(&way)) - values).abs() < 1e-14, "{:?}", row.hessian);
         }
     }
