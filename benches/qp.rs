@@ -1,12 +1,11 @@
-//! Cost of the quadratic program by itself: `cargo bench --bench qp`. The interior-point method
-//! runs beside the active-set method on the same problems.
+//! Cost of the quadratic program by itself: `cargo bench --bench qp`.
 
 #![allow(missing_docs, reason = "criterion_group! makes an undocumented function")]
 
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use punctual_core::qp::{Backend, Bounds, Outcome, Problem, Row, Workspace};
+use punctual_core::qp::{Bounds, Outcome, Problem, Row, Workspace};
 
 fn row(normal: [f64; 2], floor: f64) -> Row {
     let mut row = Row { floor, ..Row::ZERO };
@@ -44,28 +43,24 @@ fn programs(c: &mut Criterion) {
         ("infeasible, bounds", contradictory, bounds),
     ];
     let u_ref = [0.1, -0.2];
-    for (backend, suffix) in [(Backend::DualActiveSet, ""), (Backend::InteriorPoint, ", interior point")] {
-        let mut workspace = Workspace::new(backend);
-        for (name, rows, bounds) in &cases {
-            let mut u = [0.0; 2];
-            let outcome = workspace.solve(&Problem::new(rows, bounds, &u_ref, 1e6), &mut u).outcome;
-            let wanted = if name.starts_with("infeasible") { Outcome::Infeasible } else { Outcome::Optimal };
-            assert_eq!(outcome, wanted, "{name}");
-            c.bench_function(&format!("qp/{name}{suffix}"), |b| {
-                b.iter(|| {
-                    let p = Problem::new(black_box(rows), bounds, black_box(&u_ref), 1e6);
-                    workspace.solve(&p, &mut u).iterations
-                });
+    let mut workspace = Workspace::new();
+    for (name, rows, bounds) in &cases {
+        let mut u = [0.0; 2];
+        let outcome = workspace.solve(&Problem::new(rows, bounds, &u_ref, 1e6), &mut u).outcome;
+        let wanted = if name.starts_with("infeasible") { Outcome::Infeasible } else { Outcome::Optimal };
+        assert_eq!(outcome, wanted, "{name}");
+        c.bench_function(&format!("qp/{name}"), |b| {
+            b.iter(|| {
+                let p = Problem::new(black_box(rows), bounds, black_box(&u_ref), 1e6);
+                workspace.solve(&p, &mut u).iterations
             });
-        }
-        if backend == Backend::DualActiveSet {
-            let (_, rows, bounds) = &cases[3];
-            let p = Problem::new(rows, bounds, &u_ref, 1e6);
-            let mut u = [0.0; 2];
-            workspace.solve(&p, &mut u);
-            c.bench_function("qp/residuals", |b| b.iter(|| workspace.residuals(&p, black_box(&u))));
-        }
+        });
     }
+    let (_, rows, bounds) = &cases[3];
+    let p = Problem::new(rows, bounds, &u_ref, 1e6);
+    let mut u = [0.0; 2];
+    workspace.solve(&p, &mut u);
+    c.bench_function("qp/residuals", |b| b.iter(|| workspace.residuals(&p, black_box(&u))));
 }
 
 criterion_group!(benches, programs);

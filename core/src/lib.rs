@@ -63,7 +63,6 @@
 //! |---|---|
 //! | `std` (default) | Rust's standard library in the dependencies. Without it the crate needs `alloc` only. |
 //! | `serde` | `Serialize` and `Deserialize` for states, reports, settings and derivatives. |
-//! | `interior-point` | a second solver of the quadratic program, to compare with. Needs `std`. |
 //! | `plan` | plans: `filter::Filter` promises only what a verified plan keeps. Needs `std`. |
 //!
 //! A filter gives the same bits on every operating system and processor: [`elementary`] functions (sin, exp, …) are those

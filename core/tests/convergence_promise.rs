@@ -3,7 +3,6 @@
 //! The loop is closed by hand: h⁽ⁿ⁾ is set to the floor, held over each step, and integrated exactly.
 
 use punctual_core::convergence::comparison::factorial;
-use punctual_core::convergence::first_order::Exponent;
 use punctual_core::convergence::repeated_root::{Deadlines, NoAdmissibleRate, Reason};
 use punctual_core::convergence::{FixedTime, FixedTimeSettings, FixedTimeState, Method, Phase, Refusal};
 
@@ -105,27 +104,8 @@ fn odd_orders_arrive_where_a_rate_exists() {
 }
 
 #[test]
-fn the_first_order_condition_arrives_at_the_deadline() {
-    for p in [0.2, 0.5, 0.8] {
-        let method = Method::FirstOrder(Exponent::new(p).expect("in range"));
-        for (h, step) in [(-10.0, 0.001), (-1e-6, 0.01), (-1e9, 0.05)] {
-            let run = run(settings(method), vec![h], step);
-            // Held over a step the floor is taken where it is largest: early by the first order of the
-            // method, a few steps, and never late; then no chattering: not one sample outside.
-            let early = (5.0 - run.arrival) / step;
-            assert!((-1e-9..=20.0).contains(&early), "p = {p}, h = {h}: {}", run.arrival);
-            assert!(run.least_after >= 0.0 && run.on_course, "p = {p}, h = {h}");
-        }
-    }
-}
-
-#[test]
 fn methods_are_refused_where_they_do_not_exist() {
     let message = |n, method| FixedTime::new(n, settings(method)).unwrap_err().to_string();
-    assert_eq!(
-        message(2, Method::FirstOrder(Exponent::default())),
-        "method: the first-order condition is for relative degree 1, this barrier has 2; use the reference profile"
-    );
     assert_eq!(
         message(1, Method::RepeatedRoot),
         "method: the repeated root does not exist for relative degree 1; use the reference profile"

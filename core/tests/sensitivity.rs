@@ -4,7 +4,6 @@ use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use punctual_core::MAX_RELATIVE_DEGREE;
 use punctual_core::barriers::{DistanceDisc, HalfPlane, NormBound, Outside, QuadraticDisc, StateBound};
-use punctual_core::convergence::first_order::Exponent;
 use punctual_core::convergence::stay::Means;
 use punctual_core::convergence::{FixedTime, FixedTimeState};
 use punctual_core::dynamics::{ControlAffine, WithPoint};
@@ -211,13 +210,12 @@ fn filters(which: usize, form: Form) -> (Filter, usize) {
             4,
         ),
         9 => {
-            let method = Method::FirstOrder(Exponent::default());
             let builder = Filter::builder(4, 2)
                 .barrier(
                     "speed",
                     PointMass,
                     NormBound::new(2, 1.5).expect("valid"),
-                    BarrierSettings { method, ..BarrierSettings::within(2.0) },
+                    BarrierSettings::within(2.0),
                 )
                 .expect("valid barrier");
             (formed(builder, form), 4)

@@ -3,7 +3,6 @@
 mod scenario;
 
 use proptest::prelude::*;
-use punctual_core::convergence::first_order::Exponent;
 use punctual_core::convergence::operator::Operator;
 use punctual_core::convergence::{FixedTimeState, Phase, Unmet};
 use punctual_core::dynamics::rk4_step;
@@ -96,7 +95,7 @@ fn reports_and_fresh_states_come_back() {
 #[test]
 fn settings_come_back() {
     let settings = BarrierSettings {
-        method: Method::FirstOrder(Exponent::new(0.25).expect("in range")),
+        method: Method::RepeatedRoot,
         stay_rate: Some(3.0),
         recovery: Some(0.1),
         ..BarrierSettings::within(5.0)
@@ -123,7 +122,6 @@ fn what_a_constructor_refuses_a_file_cannot_bring() {
         message.split(" at line").next().expect("a message").to_owned()
     };
     assert_eq!(refused("{\"rates\": [1, -2]}"), "rates[2]: is -2, must be finite and > 0");
-    assert!(refused("{\"method\": {\"first_order\": 1}}").starts_with("exponent: is 1, must be"));
     assert!(refused("{\"deadlin\": 1}").starts_with("unknown field `deadlin`"));
     let word = refused("{\"margin\": \"infinite\"}");
     assert_eq!(word, "invalid value: string \"infinite\", expected a number, \"inf\", \"-inf\" or \"NaN\"");

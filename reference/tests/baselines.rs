@@ -8,14 +8,13 @@ use std::array::from_fn;
 use punctual_core::MAX_RELATIVE_DEGREE;
 use punctual_core::barrier::Barrier;
 use punctual_core::convergence::condition::{Abilities, Anchored, Anchoring, Bound, Rates};
-use punctual_core::convergence::first_order::Exponent;
 use punctual_core::convergence::operator::Operator;
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Method, Phase, Sampling, Status};
 use punctual_core::lie;
 use punctual_core::scalar::Scalar;
 use punctual_reference::baselines::{
-    Chain, ClassK, Condition, Exponential, FirstOrderFixedTime, Sample, Tube,
+    Chain, ClassK, Condition, Exponent, Exponential, FirstOrderFixedTime, Sample, Tube,
 };
 use punctual_reference::simulation::{Schedule, closed_loop};
 
@@ -158,15 +157,14 @@ fn a_tube_is_kept_until_it_is_the_set() {
 #[test]
 fn settings_that_a_condition_would_replace_are_refused() {
     let build = |settings: BarrierSettings| {
-        let source = lie::along(Integrators::<1>, First, 1).expect("a source");
-        let builder = Filter::builder(1, 1).source("line", source, settings).expect("settings");
+        let source = lie::along(Integrators::<2>, First, 2).expect("a source");
+        let builder = Filter::builder(2, 1).source("line", source, settings).expect("settings");
         builder.condition(Chain::new(&[ClassK::Linear(1.0)]).unwrap()).err().map(|e| e.to_string())
     };
     let settings = BarrierSettings::within(1.0);
     assert_eq!(build(settings), None);
-    let method = Method::FirstOrder(Exponent::default());
     assert_eq!(
-        build(BarrierSettings { method, ..settings }).unwrap(),
+        build(BarrierSettings { method: Method::RepeatedRoot, ..settings }).unwrap(),
         "line.method: a custom constraint replaces method and profile"
     );
     assert_eq!(

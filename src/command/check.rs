@@ -412,7 +412,6 @@ fn filter(
             }
             Method::ReferenceProfile => ("reference profile", settings.rate.or(default_rate)),
             Method::RepeatedRoot => ("repeated root", approaching.then(|| rows.state().barriers[i].rate)),
-            Method::FirstOrder(exponent) => ("first order", Some(exponent.rate(deadline))),
             _ => ("another method", None),
         };
         let given = settings.stay_rate.or(settings.rate);

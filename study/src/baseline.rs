@@ -1,10 +1,9 @@
 //! Baselines with their parameters, and our own methods, in the settings they are run in.
 
-use punctual_core::convergence::first_order::Exponent;
 use punctual_core::elementary;
 use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Method, ProfileKind, Sampling};
 use punctual_core::lie::DerivativeSource;
-use punctual_reference::baselines::{Chain, Exponential, FirstOrderFixedTime, Tube};
+use punctual_reference::baselines::{Chain, Exponent, Exponential, FirstOrderFixedTime, Tube};
 
 /// A constraint with its parameters, for relative degree 2.
 #[derive(Clone, Copy, Debug, PartialEq)]

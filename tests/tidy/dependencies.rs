@@ -54,8 +54,7 @@ fn crates_depend_on_crates_below_them_only() {
                 "punctual-pictures",
                 "punctual-reference",
                 "punctual-study",
-                // The interior-point method and the models, for benchmarks.
-                "punctual-core",
+                // The models, for benchmarks.
                 "punctual-models",
             ],
         ),
@@ -285,7 +284,7 @@ fn documented(path: &str, module: impl FnMut(&str) -> Option<String>) -> Vec<Vec
 #[test]
 fn each_dependency_is_named_in_one_place() {
     let owners = [
-        (&["clarabel", ":", ":"][..], &["core/src/qp/interior_point.rs", "core/src/plan/search.rs"][..]),
+        (&["clarabel", ":", ":"][..], &["core/src/plan/search.rs"][..]),
         (&["quick_xml", ":", ":"], &["modeldescription/src/"]),
         (&["zip", ":", ":"], &["modeldescription/src/", "cosim/src/host/archive.rs"]),
         (&["toml", ":", ":"], &["fmu/src/configuration/"]),

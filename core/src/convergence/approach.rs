@@ -4,7 +4,6 @@ use alloc::borrow::ToOwned;
 use alloc::sync::Arc;
 
 use super::condition::{Abilities, Bound, Condition, Sample};
-use super::first_order::FirstOrder;
 use super::reference_profile::ReferenceProfile;
 use super::repeated_root::RepeatedRoot;
 use super::settings::{FixedTimeSettings, Method};
@@ -17,8 +16,6 @@ pub(super) enum Approach {
     Profile(ReferenceProfile),
     /// [`Method::RepeatedRoot`].
     Root(RepeatedRoot),
-    /// [`Method::FirstOrder`].
-    First(FirstOrder),
     /// A user's own.
     Own(Arc<dyn Condition + Send + Sync>),
 }
@@ -29,9 +26,6 @@ pub(super) fn check(method: Method, n: usize) -> Result<(), Error> {
         Method::RepeatedRoot if n == 1 => {
             "the repeated root does not exist for relative degree 1; use the reference profile".to_owned()
         }
-        Method::FirstOrder(_) if n != 1 => format!(
-            "the first-order condition is for relative degree 1, this barrier has {n}; use the reference profile"
-        ),
         _ => return Ok(()),
     };
     Err(Error::new(ErrorKind::Unsupported, "method", message))
@@ -43,7 +37,6 @@ impl Approach {
         match settings.method {
             Method::ReferenceProfile => Self::Profile(ReferenceProfile::new(settings)),
             Method::RepeatedRoot => Self::Root(RepeatedRoot),
-            Method::FirstOrder(exponent) => Self::First(FirstOrder(exponent)),
         }
     }
 
@@ -53,7 +46,6 @@ impl Approach {
         match self {
             Self::Profile(condition) => condition,
             Self::Root(condition) => condition,
-            Self::First(condition) => condition,
             Self::Own(condition) => &**condition,
         }
     }
@@ -64,7 +56,6 @@ impl Approach {
         match self {
             Self::Profile(condition) => condition.bound(at),
             Self::Root(condition) => condition.bound(at),
-            Self::First(condition) => condition.bound(at),
             Self::Own(condition) => condition.bound(at),
         }
     }
@@ -75,7 +66,6 @@ impl Approach {
         match self {
             Self::Profile(condition) => condition.abilities(),
             Self::Root(condition) => condition.abilities(),
-            Self::First(condition) => condition.abilities(),
             Self::Own(condition) => condition.abilities(),
         }
     }

@@ -1,8 +1,8 @@
 //! The trait that every constraint implements: a floor under h⁽ⁿ⁾ that is known from h, …, h⁽ⁿ⁻¹⁾.
 //!
 //! One file per method implements [`Condition`]: `reference_profile`,
-//! [`repeated_root`](super::repeated_root), [`first_order`](super::first_order) on the way to the set,
-//! [`stay`](super::stay) inside it. A user's own condition takes the place of the first three
+//! [`repeated_root`](super::repeated_root) on the way to the set, [`stay`](super::stay) inside it. A user's own condition takes
+//! the place of the first two
 //! ([`FixedTime::with_condition`](super::FixedTime::with_condition)); all else of a filter stays as it is.
 //!
 //! A new method is a file here that implements the trait, a variant of [`Method`](super::Method) and one of

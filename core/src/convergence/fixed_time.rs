@@ -79,7 +79,7 @@ impl FixedTime {
     /// # Errors
     ///
     /// `n` outside 1 ..= [`MAX_RELATIVE_DEGREE`], a setting outside the range its field states, the
-    /// repeated root with n = 1, the first-order condition with n > 1.
+    /// repeated root with n = 1.
     pub fn new(n: usize, settings: FixedTimeSettings) -> Result<Self, Error> {
         let settings = settings.validated(n)?;
         Ok(Self { n, settings, approach: Approach::new(&settings) })
@@ -113,7 +113,7 @@ impl FixedTime {
         let is_plain = match &self.approach {
             Approach::Profile(reference) => !reference.has_own_profile(),
             Approach::Own(_) => true,
-            Approach::Root(_) | Approach::First(_) => false,
+            Approach::Root(_) => false,
         };
         let message = if !is_plain {
             Some(("method", "a custom constraint replaces method and profile"))
@@ -318,8 +318,8 @@ impl FixedTime {
     }
 
     /// (S) of [`sampled`](super::sampled) from the sample at `t` (s), which `state` has been moved to with [`advance`](Self::advance) and
-    /// where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾, over `period` > 0 seconds. `None` under a condition that is not linear in e: on the
-    /// approach of the first-order condition, and under most of a user's own.
+    /// where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾, over `period` > 0 seconds. `None` under a condition that is not linear in e, as most of a
+    /// user's own.
     pub fn over_period(&self, state: &FixedTimeState, t: f64, h: &[f64], period: f64) -> Option<PeriodBound> {
         self.in_force(state, t, h, |condition, at| {
             condition.over_period(at, h, period, self.settings.disturbance)

@@ -9,7 +9,6 @@
 //! |---|---|---|---|---|
 //! | [`repeated_root`], the paper's | h − μ | largest root of (R), negative from rest | h ≥ μ from T on | n even; n odd: T ≥ T_min, if any |
 //! | [`hermite`], the default | h − μ − r | any a > 0 | h ≥ μ from T on | always |
-//! | [`first_order`] | h − μ | 1/((1 − p) T) at the anchor | h ≥ μ at T | n = 1 |
 //! | [`stay`] | h − μ | a ≥ [`stay::smallest_rate`], recomputed at every sample | h ≥ μ for ever | all c_k(a) ≥ 0 |
 //!
 //! A constraint that is none of these takes their place as a [`condition`].
@@ -22,7 +21,6 @@
 mod approach;
 pub mod comparison;
 pub mod condition;
-pub mod first_order;
 mod fixed_time;
 pub mod hermite;
 pub mod operator;

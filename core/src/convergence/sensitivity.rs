@@ -1,8 +1,8 @@
 //! The change of a promise's floors with the derivatives of h.
 //!
 //! At a sample that does not anchor, [`FixedTime::advance`] and [`FixedTime::over_period`] compute the floors from
-//! h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ with anchor, margin and rates as they are. They are linear functions, but for the first-order
-//! condition. At a sample that anchors, the anchor is h itself; margin and the repeated root follow it:
+//! h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ with anchor, margin and rates as they are. They are linear functions.
+//! At a sample that anchors, the anchor is h itself; margin and the repeated root follow it:
 //!
 //! ```text
 //! e = h − μ(h),   r' = (∂r/∂e(0)) e(0)',

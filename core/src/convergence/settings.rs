@@ -3,7 +3,6 @@
 use alloc::borrow::ToOwned;
 use alloc::string::String;
 
-use super::first_order::Exponent;
 use super::operator::Operator;
 use crate::MAX_RELATIVE_DEGREE;
 use crate::error::{Error, ErrorKind, non_negative, positive};
@@ -22,8 +21,6 @@ pub enum Method {
     /// one's own ([`FixedTime::with_profile`](super::FixedTime::with_profile)).
     #[default]
     ReferenceProfile,
-    /// ė ≥ α |e|^p for e = h − μ < 0, with α such that e = 0 at T ([`Exponent`]). Relative degree 1.
-    FirstOrder(Exponent),
 }
 
 /// The profile that [`Method::ReferenceProfile`] follows, unless it is a custom one.

@@ -14,7 +14,7 @@ use crate::convergence::{FixedTime, FixedTimeState};
 use crate::dynamics::ControlAffine;
 use crate::error::{Error, ErrorKind, length, non_negative, positive};
 use crate::lie::{self, DerivativeSource};
-use crate::qp::{self, Backend, Bounds, Enforcement, Row};
+use crate::qp::{self, Bounds, Enforcement, Row};
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE, MAX_ROWS};
 
 /// A collection of barriers and bounds for a [`Filter`].
@@ -29,7 +29,6 @@ pub struct FilterBuilder {
     arm_after: f64,
     delay: f64,
     errors: Vec<f64>,
-    backend: Backend,
 }
 
 impl FilterBuilder {
@@ -48,7 +47,6 @@ impl FilterBuilder {
             arm_after: 0.0,
             delay: 0.0,
             errors: Vec::new(),
-            backend: Backend::default(),
         }
     }
 
@@ -275,13 +273,6 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// Chooses the method for QPs of several rows. Default: [`Backend::DualActiveSet`], which does not allocate;
-    /// the other is for comparison and knows no priorities.
-    pub fn backend(mut self, backend: Backend) -> Self {
-        self.backend = backend;
-        self
-    }
-
     /// Bounds the input: `min[i]` ≤ u_i ≤ `max[i]`, in units of u; ±infinity where there is none.
     /// Default: none.
     ///
@@ -417,7 +408,6 @@ impl FilterBuilder {
             arm_after,
             delay,
             errors,
-            backend,
         } = self;
         // Dimensions.
         let dimension = |field, message| Err(Error::new(ErrorKind::Dimension, field, message));
@@ -468,7 +458,7 @@ impl FilterBuilder {
             scratch: vec![0.0; state_dim],
             report: Report::new(slots.len()),
             search: Scratch::new(SharedPlants::of(&mut slots)),
-            qp: qp::Workspace::new(backend),
+            qp: qp::Workspace::new(),
         };
         let deadlines = slots.iter().map(|slot| slot.promise.deadline());
         let first_period = sampling.first(deadlines.fold(f64::INFINITY, f64::min));

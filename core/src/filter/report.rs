@@ -262,7 +262,7 @@ pub struct Report {
     pub status: Status,
     /// The method that solved the QP.
     pub solver: Solver,
-    /// Rounds of the active-set method, iterations of the interior-point method, else 0. It alone depends on more than
+    /// Rounds of the active-set method, else 0. It alone depends on more than
     /// the filter's state: a step is faster where the same rows and bounds are active as in the one before.
     pub iterations: u32,
     /// The sampling period in s that the step accounted for, 0 for the pointwise constraint.

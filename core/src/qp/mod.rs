@@ -11,8 +11,7 @@
 //! - one row, W = 1: closed form, with or without bounds (module `single_row`).
 //! - else: a dual active-set method (module `dual_active_set`), exact up to round-off.
 //!
-//! None of these allocates. A wrong answer would show in [`Workspace::residuals`]. clarabel (module
-//! `interior_point`), which does allocate, can be chosen instead.
+//! None of these allocates. A wrong answer would show in [`Workspace::residuals`].
 //!
 //! Bounds are never relaxed. Hard rows that cannot be met within them are violated as little as possible. Each,
 //! in the order of priority and then of the list, is violated as little as those before it allow. Among the inputs
@@ -28,8 +27,6 @@
 mod canonical;
 mod dual_active_set;
 mod factors;
-#[cfg(feature = "interior-point")]
-mod interior_point;
 mod kkt;
 mod one_active;
 mod row_set;
@@ -206,19 +203,6 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// Method for problems that have no closed form.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Backend {
-    /// The dual active-set method: exact up to round-off, no allocation.
-    #[default]
-    DualActiveSet,
-    /// The interior-point method clarabel, for comparison: accurate to about 1e-6 of the correction. It
-    /// takes rows as hard, relaxes them together where they cannot be met, and ignores weights.
-    #[cfg(feature = "interior-point")]
-    InteriorPoint,
-}
-
 /// Method that produced the answer. The numbers are stable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -231,8 +215,6 @@ pub enum Solver {
     Unchanged = 0,
     /// A closed form, for one row or where one is active.
     ClosedForm = 1,
-    /// The interior-point method.
-    InteriorPoint = 2,
     /// The dual active-set method.
     DualActiveSet = 3,
 }
@@ -259,7 +241,7 @@ pub struct Solution {
     pub outcome: Outcome,
     /// Method that produced it.
     pub solver: Solver,
-    /// Rounds of the active-set method or iterations of the interior-point method, else 0; 0 too where the rows
+    /// Rounds of the active-set method, else 0; 0 too where the rows
     /// and bounds of the workspace's last answer were those of this one.
     pub iterations: u32,
 }
@@ -289,7 +271,6 @@ pub struct Active {
 /// where the same rows and bounds are active, and changes no bit of it.
 #[derive(Clone)]
 pub struct Workspace {
-    backend: Backend,
     // The method for the number of inputs, rounded up. For two inputs it takes a third of the time of the last one.
     two: DualActiveSet<2>,
     four: DualActiveSet<4>,
@@ -303,15 +284,14 @@ pub struct Workspace {
 
 impl Default for Workspace {
     fn default() -> Self {
-        Self::new(Backend::default())
+        Self::new()
     }
 }
 
 impl Workspace {
-    /// A workspace for any problem, with this method where there is no closed form.
-    pub const fn new(backend: Backend) -> Self {
+    /// A workspace for any problem.
+    pub const fn new() -> Self {
         Self {
-            backend,
             two: DualActiveSet::EMPTY,
             four: DualActiveSet::EMPTY,
             twelve: DualActiveSet::EMPTY,
@@ -334,9 +314,7 @@ impl Workspace {
         let guess = if (self.relaxed | self.ill_conditioned).is_empty() { self.active_len } else { 0 };
         (self.active_len, self.relaxed, self.ill_conditioned) = (0, RowSet::EMPTY, RowSet::EMPTY);
         // u_ref itself, or one active row.
-        if let Some(answer) = one_active::solve(p, u)
-            && (self.backend == Backend::DualActiveSet || matches!(answer, Answer::Reference))
-        {
+        if let Some(answer) = one_active::solve(p, u) {
             let mut solver = Solver::Unchanged;
             if let Answer::Row(row, multiplier) = answer {
                 self.note_active(row, multiplier);
@@ -365,10 +343,6 @@ impl Workspace {
                 Outcome::IllConditioned | Outcome::Failed => self.ill_conditioned = RowSet::of(0),
             }
             return Solution { outcome, solver: Solver::ClosedForm, iterations: 0 };
-        }
-        #[cfg(feature = "interior-point")]
-        if self.backend == Backend::InteriorPoint {
-            return interior_point::solve(p.rows, p.bounds, p.u_ref, p.correction_limit, u);
         }
         // Several: from the guess, else by the dual active-set method.
         let Self { two, four, twelve, any, active, active_len, relaxed, ill_conditioned, .. } = self;
@@ -431,19 +405,17 @@ impl Workspace {
     }
 
     /// The active rows and bounds of the last solve, soft rows at their largest multiplier last. Empty after
-    /// the interior-point method, and after one row that cannot be met.
+    /// one row that cannot be met.
     pub fn active(&self) -> &[Active] {
         &self.active[..self.active_len]
     }
 
     /// The rows of the last solve that were relaxed because they cannot be met ([`Outcome::Infeasible`]).
-    /// Unknown to the interior-point method.
     pub fn relaxed(&self) -> RowSet {
         self.relaxed
     }
 
-    /// The rows of the last solve that were ill-conditioned ([`Outcome::IllConditioned`]). Unknown to the
-    /// interior-point method.
+    /// The rows of the last solve that were ill-conditioned ([`Outcome::IllConditioned`]).
     pub fn ill_conditioned(&self) -> RowSet {
         self.ill_conditioned
     }

@@ -1,16 +1,14 @@
 //! The first-order fixed-time control barrier function.
 
 use super::chain::{Chain, ClassK};
-use super::{Bound, Condition, Sample, checked_order};
+use super::{Bound, Condition, Exponent, Sample, checked_order};
 use punctual_core::MAX_RELATIVE_DEGREE;
-use punctual_core::convergence::first_order::Exponent;
 use punctual_core::elementary;
 use punctual_core::error::{Error, positive};
 
 /// ψ_1 = ḣ + α |h|^p sign h with α = |h₀|^{1−p}/((1 − p) T), such that h = 0 at T where ψ_1 = 0 throughout.
 ///
-/// For n = 1 it is ψ_1 ≥ 0, below and above zero
-/// ([`Method::FirstOrder`](punctual_core::filter::Method::FirstOrder) is used below only). For n > 1 the
+/// For n = 1 it is ψ_1 ≥ 0, below and above zero. For n > 1 the
 /// constraint is (D + k)ⁿ⁻¹ ψ_1 ≥ 0, which is ours. It keeps the deadline where ψ_1 and its first n − 2
 /// derivatives start so that ψ_1 ≥ 0 from then on. A start at rest outside has ψ_1 < 0, and arrives later than T.
 ///

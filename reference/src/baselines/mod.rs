@@ -27,6 +27,7 @@ mod backup_barrier;
 mod chain;
 #[cfg(test)]
 mod double_integrator;
+mod exponent;
 mod exponential;
 mod first_order;
 mod gatekeeper;
@@ -35,6 +36,7 @@ mod tube;
 pub use backup::{Backup, Brake, Law, Stoppable};
 pub use backup_barrier::{BackedUp, BackupBarrier};
 pub use chain::{Chain, ClassK};
+pub use exponent::Exponent;
 pub use exponential::Exponential;
 pub use first_order::FirstOrderFixedTime;
 pub use gatekeeper::Gatekeeper;

@@ -22,8 +22,6 @@
 //! can only overshoot into the set, by at most α |e|^p δ over a period δ; within
 //! (αδ)^{1/(1−p)} of zero, where that exceeds |e|, one step arrives. Above zero the same condition
 //! (ė ≥ −α e^p) lets e reach zero in finite time and a held input pass it, back and forth: chattering.
-//! So it is used below zero only, and [`FixedTime`](super::FixedTime) switches to the stay constraint,
-//! which is linear, at the first sample with e ≥ 0.
 //!
 //! # References
 //!
@@ -32,14 +30,11 @@
 //! S. P. Bhat and D. S. Bernstein, *Finite-time stability of continuous autonomous systems*, SIAM J.
 //! Control Optim. 38 (2000), doi 10.1137/S0363012997321358, for the comparison argument.
 
-use super::condition::{Abilities, AnchorChange, Anchored, Anchoring, Bound, Condition, Sample};
-use crate::elementary;
-use crate::error::{Error, ErrorKind};
+use punctual_core::elementary;
+use punctual_core::error::{Error, ErrorKind};
 
 /// The exponent p of (F), dimensionless, in (0, 1). Default 1/2.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(try_from = "f64"))]
 pub struct Exponent(f64);
 
 /// Equality is an equivalence, as p is never NaN.
@@ -48,16 +43,6 @@ impl Eq for Exponent {}
 impl Default for Exponent {
     fn default() -> Self {
         Self(0.5)
-    }
-}
-
-#[cfg(feature = "serde")]
-impl TryFrom<f64> for Exponent {
-    type Error = Error;
-
-    /// [`Self::new`], for what is read from a file.
-    fn try_from(p: f64) -> Result<Self, Error> {
-        Self::new(p)
     }
 }
 
@@ -94,61 +79,14 @@ impl Exponent {
         -self.rate(deadline) * anchor * elementary::powf(e / anchor, self.0)
     }
 
-    /// The derivatives of [`Self::floor`] by `anchor` and by `e`, in 1/s.
-    fn floor_change(self, anchor: f64, deadline: f64, e: f64) -> [f64; 2] {
-        if e >= 0.0 {
-            return [0.0; 2];
-        }
-        let (rate, power) = (self.rate(deadline), elementary::powf(e / anchor, self.0));
-        [-rate * (1.0 - self.0) * power, -rate * self.0 * power * anchor / e]
-    }
-
     /// The lower bound (F) on e at `elapsed` = τ ≥ 0 from `anchor` = e(0) < 0, `[e]`; 0 from T on.
     pub fn lower_bound(self, anchor: f64, deadline: f64, elapsed: f64) -> f64 {
         anchor * elementary::powf((1.0 - elapsed / deadline).max(0.0), 1.0 / (1.0 - self.0))
     }
 }
 
-/// The condition of [`Method::FirstOrder`](super::Method::FirstOrder).
-#[derive(Clone, Copy, Debug)]
-pub struct FirstOrder(pub Exponent);
-
-impl Condition for FirstOrder {
-    #[inline(always)]
-    fn bound(&self, at: &Sample) -> Bound {
-        let (Self(exponent), anchor, e) = (self, at.anchor[0], at.e[0]);
-        let lower = exponent.lower_bound(anchor, at.deadline, at.elapsed);
-        // The comparison can start at any sample that is not below the bound.
-        let applies = at.elapsed < at.deadline && e >= lower;
-        Bound { floor: exponent.floor(anchor, at.deadline, e), lower, applies }
-    }
-
-    fn abilities(&self) -> Abilities {
-        Abilities { hands_over: true, ..Abilities::default() }
-    }
-
-    fn anchor(&self, at: &Anchoring) -> Anchored {
-        let rate = if at.is_past() { at.stay_rate } else { self.0.rate(at.deadline) };
-        Anchored { margin: at.margin, rate, fallback: false, applies: !at.is_past() }
-    }
-
-    fn anchor_change(&self, _at: &Sample, [_, dh]: [&[f64]; 2], _period: f64) -> Option<AnchorChange> {
-        let mut change = AnchorChange::default();
-        change.anchor[..dh.len()].copy_from_slice(dh);
-        Some(change)
-    }
-
-    fn bound_change(&self, at: &Sample, change: Option<&AnchorChange>, de: &[f64]) -> Option<[f64; 2]> {
-        let anchor = change.map_or(0.0, |change| change.anchor[0]);
-        let [by_anchor, by_error] = self.0.floor_change(at.anchor[0], at.deadline, at.e[0]);
-        Some([by_anchor * anchor + by_error * de[0], anchor])
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use alloc::string::ToString;
-
     use super::*;
 
     #[test]
