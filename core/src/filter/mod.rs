@@ -260,11 +260,11 @@ impl Filter {
     /// By status:
     ///
     /// - [`Unchanged`](Status::Unchanged), [`SolverFailed`](Status::SolverFailed): the direction of u_ref, 0 in components
-    ///   held   by a bound.
+    ///   held by a bound.
     /// - [`Filtered`](Status::Filtered), [`Infeasible`](Status::Infeasible) and [`NoAuthority`](Status::NoAuthority): (8)
-    ///   with the   active rows, including those that hold back a row that cannot be met. Rows that were given up or left
-    ///   out take no part.   For a single row that cannot be met: 0 in the components at their bounds, the direction of
-    ///   u_ref in the others.
+    ///   with the active rows, including those that hold back a row that cannot be met. Rows that were given up or left out
+    ///   take no part. For a single row that cannot be met: 0 in the components at their bounds, the direction of u_ref in
+    ///   the others.
     /// - [`InvalidInput`](Status::InvalidInput), [`Singular`](Status::Singular) and
     ///   [`WrongRelativeDegree`](Status::WrongRelativeDegree), where the input is a constant: all zero.
     /// - [`NotArmed`](Status::NotArmed): the direction of u_ref, 0 in components held by a bound; h as always.

@@ -90,9 +90,9 @@ const EVEN: f64 = 4e-4;
 /// are 1e-9 where the curvature is [`EVEN`]; the error of two steps is a sixteenth of that.
 const MIDDLE: f64 = 3.0;
 
-/// Largest factor on its own curvature with which a rate counts, when curvatures are compared with the largest rate. Rates
-/// of different states have different units, and one that is constant shows nothing of the others: a vehicle that is spun
-/// does not move straight for that.
+/// Largest size with which a rate counts, in units of its own curvature, when curvatures are compared with the largest rate.
+/// Rates of different states have different units, and one that is constant shows nothing of the others: the path of a
+/// vehicle is not straight because the vehicle spins at a constant rate.
 const COUNTS: f64 = 1e6;
 
 /// Whether the rates at the four stages of a Runge-Kutta step, state by state, are curved so little that one step suffices.
@@ -387,7 +387,7 @@ where
     barrier.value(time_over(time), &states).coefficients[EXPANSION_ORDERS - 1]
 }
 
-/// Time since anywhere in `time`.
+/// Time as an expansion that starts anywhere in `time`.
 #[inline(always)]
 fn time_over<const K: usize>(time: Interval) -> Taylor<Interval, K> {
     let mut expansion = Taylor::time(0.0);
