@@ -342,7 +342,7 @@ where
     }
 }
 
-/// What is violated if the memory passed belongs to another plant.
+/// The expectation that is violated if a room belongs to another plant.
 const ROOM: &str = "a room that a source along the same plant has made";
 
 impl<P, B, const NX: usize, const NU: usize, const K: usize, const N: usize> Directional

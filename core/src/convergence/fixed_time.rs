@@ -401,8 +401,9 @@ impl FixedTime {
     /// It does not restart shortly before the deadline, where a profile from anywhere would require any input, nor along a
     /// custom profile, whose check takes long.
     pub(crate) fn restart(&self, state: &mut FixedTimeState, t: f64, h: &[f64], period: f64) -> bool {
-        /// Number of samples, and part of the configured deadline, that must be left.
+        /// Number of samples that must be left.
         const SAMPLES: f64 = 10.0;
+        /// Part of the configured deadline that must be left.
         const PART: f64 = 0.05;
         let left = state.deadline - (t - state.anchor_time);
         let lost = state.phase == Phase::Approach && !state.on_course && h[0] < 0.0 && t > state.anchor_time;

@@ -81,6 +81,7 @@ pub struct Unmet {
 }
 
 impl Unmet {
+    /// Rise of h that counts as progress, as a part of its size.
     const PROGRESS: f64 = 0.01;
 
     /// Counts another step, at time `t` with the value `h`.

@@ -160,7 +160,7 @@ pub struct BarrierReport {
     /// The row aᵀu ≥ b given to the QP; a and b in `[h]`/sⁿ. If the step looked over the sampling period
     /// ([`Report::predicted`]), this is its linearisation at the returned u.
     pub row: Row,
-    /// aᵀu − b at the returned u: < 0 where the row is violated, by that much.
+    /// aᵀu − b at the returned u: < 0 by the amount of the violation.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub slack: f64,
     /// Number of consecutive steps that have not met the constraint, including this one.
@@ -272,7 +272,7 @@ pub struct Report {
     pub predicted: bool,
     /// One entry per barrier, in the order they were added.
     pub barriers: Vec<BarrierReport>,
-    /// Whether the promises are kept, who chose the input and why; `None` from a filter without plans.
+    /// Whether the promises are kept, which source chose the input, and why; `None` from a filter without plans.
     #[cfg(feature = "plan")]
     pub assurance: Option<super::Assurance>,
 }

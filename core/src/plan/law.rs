@@ -119,7 +119,7 @@ impl StoppingController {
         Some(Self { state, input, gain: Gain::from(&gain), hold, growth })
     }
 
-    /// Whether it is a law for a plant with so many states and inputs.
+    /// Whether it is a law for a plant with `states` states and `inputs` inputs.
     pub(super) fn fits(&self, states: usize, inputs: usize) -> bool {
         let Self { state, input, gain, hold, growth } = self;
         is_of(state, states)
@@ -150,7 +150,7 @@ pub(super) struct Reference {
 }
 
 impl Reference {
-    /// Whether it belongs to a plant with so many states and inputs.
+    /// Whether it belongs to a plant with `states` states and `inputs` inputs.
     pub(super) fn fits(&self, states: usize, inputs: usize) -> bool {
         let Self { times, inputs: held, states: nodes, gains } = self;
         is_of(times, held.len() + 1)

@@ -1,4 +1,4 @@
-//! Plans: a verified way to keep every promise, from a state on, within the bounds of the inputs.
+//! Plans: a verified way to keep every promise, starting from a state, within the bounds of the inputs.
 //!
 //! A *plan* is a list of held inputs, and a law that holds the plant at an equilibrium after them. It is a *backup plan* for
 //! the promise if, run ahead in the model, it meets every requirement at all times. At every sample the filter applies
@@ -103,7 +103,7 @@ impl Plan {
         self.stopping.is_none()
     }
 
-    /// What is wrong with it as a plan for a plant with so many states and inputs; a plan from a file may be wrong.
+    /// What is wrong with it as a plan for a plant with `states` states and `inputs` inputs; a plan from a file may be wrong.
     pub(crate) fn flaw(&self, [states, inputs]: [usize; 2]) -> Option<&'static str> {
         let is_flawed = self.stopping.as_ref().is_some_and(|stopping| !stopping.fits(states, inputs))
             || self.reference.as_ref().is_some_and(|reference| !reference.fits(states, inputs))

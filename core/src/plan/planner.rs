@@ -65,7 +65,7 @@ const TIGHTENING: u32 = 4;
 const RESOLVED: [f64; 2] = [1e-5, 1e-8];
 /// The longest step of the model, in sampling periods.
 const COARSE: f64 = 4.0;
-/// The longest step of the model as a part of a hold (1/32), used if that is longer.
+/// The number of steps in a hold with the longest step of the model, if that step is longer than [`COARSE`] periods.
 const FINE: f64 = 32.0;
 /// The number of samples in a usual period above which a plan has longer holds.
 const FREQUENT: f64 = 4.0;

@@ -224,10 +224,15 @@ pub(super) fn least_factor<T>(
     find: impl Fn(f64) -> Option<(f64, T)>,
     sooner: impl Fn(f64, &(f64, T)) -> Option<(f64, T)>,
 ) -> Option<(f64, T)> {
+    /// Ratio of two factors below which a nearby search is no longer worthwhile.
     const FINE: f64 = 1.02;
+    /// Factor below which the search goes no further.
     const LEAST: f64 = 1e-3;
+    /// Largest factor tried.
     const MOST: f64 = 1e6;
+    /// Largest number of further searches that do not start nearby.
     const SEARCHES: u32 = 3;
+    /// Least ratio of the factor found to the one that failed at which such a search is made.
     const WIDE: f64 = 1.1;
     // Double the factor until something is found. Then halve it, and reduce it by less whenever nothing is found nearby.
     let longest = longest.min(MOST);

@@ -411,6 +411,7 @@ fn trial_state(i: usize, trial: usize) -> f64 {
 /// Whether h changes with time alone, at some states, and no bounds on that change are known. h is evaluated at a few times
 /// in s, and over all times at once if it has enclosures.
 fn leaves(slot: &BarrierSlot, states: usize) -> bool {
+    /// Times in s at which h is compared with its first value.
     const TIMES: [f64; 4] = [0.0, 0.7, 31.0, 4e3];
     let Some(model) = slot.source.predict() else { return false };
     (0..4).any(|trial| {
@@ -424,6 +425,7 @@ fn leaves(slot: &BarrierSlot, states: usize) -> bool {
 
 /// Checks at a few states that every barrier predicts the same plant: one plan serves all of them.
 fn one_plant(rows: &Rows, period: f64) -> Result<(), Error> {
+    /// Number of states at which the plants are compared.
     const TRIALS: usize = 4;
     let (nx, nu) = (rows.state_dim, rows.input_dim);
     let moved = |slot: &BarrierSlot, trial: usize| {

@@ -302,7 +302,9 @@ fn margin(model: &dyn Predict, t: f64, x: &[f64], h: f64) -> f64 {
 
 /// The largest h found by climbing from `x` at `t`, up to `enough`.
 fn highest(model: &dyn Predict, t: f64, x: &[f64], enough: f64) -> f64 {
+    /// Largest number of steps uphill.
     const STEPS: u32 = 60;
+    /// Largest number of halvings of a step that does not climb.
     const HALVINGS: u32 = 30;
     let (mut x, mut gradient, mut next) = (x.to_vec(), x.to_vec(), x.to_vec());
     let mut h = model.value(t, &x);

@@ -196,6 +196,7 @@ const LARGEST: Lowest = Lowest { h: f64::INFINITY, at: 0.0 };
 
 /// The end of part `k` of `parts`, whose lengths grow from 0.8 to 1.2 times the mean.
 fn instant([from, to]: [f64; 2], k: usize, parts: usize) -> f64 {
+    /// Difference of the first and the last part from the mean length, as a part of it.
     const UNEVEN: f64 = 0.2;
     let z = k as f64 / parts as f64;
     if k == parts { to } else { from + (to - from) * z * (1.0 - UNEVEN * (1.0 - z)) }

@@ -153,6 +153,7 @@ impl Outlook<'_> {
 
     /// The lowest h without a model, to the order n.
     fn lowest_of_polynomial(&self, highest: f64, from: f64, to: f64) -> Lowest {
+        /// Number of intervals between the instants examined.
         const INSTANTS: u32 = 16;
         let at = |i: u32| from + (to - from) * f64::from(i) / f64::from(INSTANTS);
         (0..=INSTANTS)

@@ -142,7 +142,7 @@ impl RowDerivative {
 /// then has an error of that order.
 const SAME_INPUT: f64 = 1e-3;
 
-/// The same if the rows are not met: beyond it the search got stuck.
+/// The same if the rows are not met or a plan backs the step: beyond it the search got stuck.
 const SAME_INPUT_UNMET: f64 = 1e-6;
 
 /// A multiplier counts as the largest from this part of the largest on.

@@ -361,6 +361,7 @@ impl BarrierSlot {
     fn postpone(&self, promise: &mut FixedTimeState, moment: &Moment, bounds: &Bounds, h: &[f64]) -> bool {
         /// New deadline, in units of the earliest time not ruled out: stopping in the set takes longer than getting there.
         const FACTOR: f64 = 2.0;
+        /// Growth of that factor from each postponement to the next.
         const GROWTH: f64 = 1.5;
         /// The longest deadline tried, in units of the configured one.
         const HORIZON: f64 = 1e3;

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use crate::interval::Interval;
 
 /// Number of intervals between the instants of the extrapolation at which the plant has to be at an equilibrium, and h is
-/// evaluated if it has no enclosures.
+/// evaluated if it is not enclosed.
 const PATH_INSTANTS: u32 = 32;
 
 /// The extrapolated motion of a number, window by window: a constant creep plus a series that dies away.
@@ -30,13 +30,13 @@ impl Motion {
         Some(Self { creep, unsure: unsure + (creep - other).abs(), end, series })
     }
 
-    /// The most by which it moves in so many windows. A creep towards the inside counts too, since it may be a slow series
+    /// The most by which it moves in `windows` windows. A creep towards the inside counts too, since it may be a slow series
     /// that will end.
     pub(super) fn to_come(self, windows: f64) -> f64 {
         self.series + (self.creep.abs() + self.unsure) * windows
     }
 
-    /// Where a number that is at `x` will be after a `part` of so many windows.
+    /// Where a number that is at `x` will be after a `part` of the next `windows` windows.
     pub(super) fn at(&self, x: f64, part: f64, windows: f64) -> f64 {
         x + (self.end + self.creep * windows) * part
     }

@@ -38,7 +38,7 @@ pub(super) struct Perturbed {
     slope: Vec<f64>,
     mean: Vec<f64>,
     curvature: Vec<f64>,
-    /// An upper bound on the growth of the difference since any instant.
+    /// The largest growth of the difference since any instant.
     grown: f64,
 }
 

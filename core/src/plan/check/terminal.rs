@@ -16,7 +16,7 @@ use crate::plan::{Failure, Integral, Requirement};
 
 /// Largest rate of a state that counts as an equilibrium, as a part of its largest along the plan.
 const AT_EQUILIBRIUM: f64 = 1e-6;
-/// Number of holds for which a drift at an equilibrium must not leave any set.
+/// Number of holds over which a drift at an equilibrium must not leave any set.
 const DRIFT: f64 = 1e3;
 /// Number of holds of the stopping controller over which the remaining motion at an equilibrium is followed.
 const SETTLING: usize = 128;
@@ -240,7 +240,7 @@ impl Walk<'_> {
         self.model.flow(x, u, left);
     }
 
-    /// Whether requirement `i` is met as the states move on, each by its motion, for so many windows of time. For a set that
+    /// Whether requirement `i` is met as the states move on, each by its motion, for `windows` windows of time. For a set that
     /// moves, or a source without enclosures, it is checked at instants.
     fn stays_ahead(&self, i: usize, ahead: &[(f64, Motion)], windows: f64) -> bool {
         let Requirement { model, from, .. } = self.requirements[i];
