@@ -108,7 +108,8 @@ pub fn is_even<S: Scalar>([k1, k2, k3, k4]: [&[S]; 4]) -> bool {
     most <= EVEN * largest
 }
 
-/// The rates of the states as numbers that carry derivatives along u: f(x) + g(x) u, by the product rule. `x` carries its own.
+/// The rates of the states as numbers that carry derivatives along u: f(x) + g(x) u, by the product rule. `x` carries its
+/// own.
 #[inline(always)]
 fn rate<P, const NX: usize, const NU: usize>(plant: &P, x: &[Dual<NU>; NX], u: &[f64; NU]) -> [Dual<NU>; NX]
 where

@@ -169,7 +169,8 @@ pub trait SharedPlant {
     /// Writes what [`DerivativeSource::evaluate`] does, from the motion that begins at time `t`.
     fn evaluate_along(&self, t: f64, motion: &dyn Any, out: &mut Derivatives);
 
-    /// Writes the motion that begins `duration` ≥ 0 seconds after `x` under the held input `u`, with its derivatives along u.
+    /// Writes the motion that begins `duration` ≥ 0 seconds after `x` under the held input `u`, with its derivatives along
+    /// u.
     fn motion_ahead(&self, x: &[f64], u: &[f64], duration: f64, room: &mut dyn Any);
 
     /// Writes what [`Predict::ahead_of_row`] does, from the motion ahead, which begins at time `t`.

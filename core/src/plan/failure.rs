@@ -29,7 +29,7 @@ pub enum Failure {
     Singular,
     /// There are too many samples, or steps of the model, to check.
     TooLong,
-    /// The plant was seen to deviate from the model. If it deviates as much again, a requirement may not be met before the
+    /// The plant was seen to deviate from the model. With 1.5 times that deviation, a requirement may not be met before the
     /// next sample.
     Drift {
         /// The number of its barrier.

@@ -103,7 +103,7 @@ impl Plan {
         self.stopping.is_none()
     }
 
-    /// What is wrong with it as a plan for a plant with `states` states and `inputs` inputs; a plan from a file may be wrong.
+    /// Its flaw as a plan for a plant with `states` states and `inputs` inputs, if any. A plan from a file may have one.
     pub(crate) fn flaw(&self, [states, inputs]: [usize; 2]) -> Option<&'static str> {
         let is_flawed = self.stopping.as_ref().is_some_and(|stopping| !stopping.fits(states, inputs))
             || self.reference.as_ref().is_some_and(|reference| !reference.fits(states, inputs))

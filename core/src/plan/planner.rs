@@ -262,7 +262,7 @@ impl<'a> Planner<'a> {
     ///
     /// # Errors
     ///
-    /// What the nearest trial fails at.
+    /// Why the nearest trial fails.
     pub(crate) fn search(&self, t: f64, x: &[f64]) -> Result<Plan, Failure> {
         let paced = Self { period: self.pace(), ..*self };
         let to = |horizon| paced.search_to(horizon, t, x);
@@ -551,7 +551,7 @@ impl<'a> Planner<'a> {
     ///
     /// # Errors
     ///
-    /// What the first of these fails at.
+    /// Why the first of these fails.
     pub(crate) fn behind(&self, plan: &Plan, t: f64, x: &[f64], u: &[f64]) -> Result<BackupPlan, Failure> {
         self.on_a_grid(|grid| {
             let at = t + self.period;
@@ -583,7 +583,7 @@ impl<'a> Planner<'a> {
     ///
     /// # Errors
     ///
-    /// What it fails at.
+    /// Why it fails.
     pub(crate) fn tail(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<BackupPlan, Failure> {
         let nu = self.dims[1];
         // Replays `held` of its holds, then applies the law behind it.
@@ -631,7 +631,7 @@ impl<'a> Planner<'a> {
     ///
     /// # Errors
     ///
-    /// What it fails at.
+    /// Why it fails.
     pub(crate) fn holds(&self, t: f64, x: &[f64], u: &[f64]) -> Result<(), Failure> {
         let grid = Grid { period: self.period, even: true };
         let mut walk = Walk::new(self.model(self.pace()), self.requirements, 1.0, grid, (t, x))?;
@@ -650,7 +650,7 @@ impl<'a> Planner<'a> {
     ///
     /// # Errors
     ///
-    /// What it fails at.
+    /// Why it fails.
     pub(crate) fn nearly(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<[f64; MAX_INPUTS], Failure> {
         let grid = Grid { period: self.period, even: true };
         let follow = |follows| self.walk(plan, NEARLY, grid, (t, x), None, follows);

@@ -196,7 +196,7 @@ impl Planning<'_> {
     ///
     /// # Errors
     ///
-    /// What the plan fails at, if it no longer keeps the promises.
+    /// Why the plan fails, if it no longer keeps the promises.
     pub(super) fn chosen(
         &self,
         planner: &Planner<'_>,

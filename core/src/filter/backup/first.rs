@@ -31,7 +31,7 @@ impl Planning<'_> {
     ///
     /// # Errors
     ///
-    /// What the nearest trial fails at.
+    /// Why the nearest trial fails.
     pub fn plan_from(&self, t: f64, x: &[f64], factor: f64) -> Result<BackupPlan, Failure> {
         let x = &self.state(x)[..];
         let promises = self.promises(t, x, |_| factor);

@@ -134,8 +134,8 @@ impl Filter {
     /// has been reached; or, if nothing else keeps the promise, the next input of the plan itself.
     ///
     /// Assumptions: the plant is the model, its state is measured exactly, and samples are one period apart. If the plant
-    /// was seen to differ from the model, and half as much again could take it out of a set before the next sample, the
-    /// guarantee is lost for that sample. A sample may be repeated at the same time, come early, or come late by a twentieth
+    /// was seen to differ from the model, and 1.5 times that difference could take it out of a set before the next sample,
+    /// the guarantee is lost for that sample. A sample may be repeated at the same time, come early, or come late by a twentieth
     /// of a hold. If the time to the next sample changes and is [known](Self::expect_hold), a plan is sought for the new
     /// one; if none is found, the guarantee is lost. A sample that comes later suspends it until the next one. While x is
     /// not finite, the plan continues as it is. A barrier without a deadline that [begins later](Begin::At) is promised from

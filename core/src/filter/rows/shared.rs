@@ -77,7 +77,8 @@ impl SharedPlants {
         }
     }
 
-    /// Writes the derivatives of the barrier of a source at time `t` (s) and the state `x` from which the input of the sample acts.
+    /// Writes the derivatives of the barrier of a source at time `t` (s) and the state `x`, at which the input of the sample
+    /// begins to act.
     #[inline(always)]
     pub(crate) fn evaluate(&mut self, source: Source, t: f64, x: &[f64], out: &mut Derivatives) {
         let Some((plant, source)) = self.shared(source) else { return source.0.evaluate(t, x, out) };

@@ -155,7 +155,7 @@ impl Walk<'_> {
             }
             let size = x.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
             let last = |seen: &dyn Fn(usize) -> f64| [4, 3, 2, 1, 0].map(|back| seen(holds - back * window));
-            // The time asked of the remainder of a plan is half as long, so that time may pass.
+            // The remainder of a plan has to stay only half as long, so that time may pass.
             let windows = |i: usize| {
                 let time = (self.requirements[i].until - self.t).min(LONG * self.strictness);
                 time / (hold * window as f64)

@@ -75,7 +75,7 @@ impl Planner<'_> {
     ///
     /// # Errors
     ///
-    /// What it fails at.
+    /// Why it fails.
     pub(crate) fn moved(&self, plan: &Plan, t: f64, x: &[f64], u: &[f64]) -> Result<Plan, Failure> {
         let moved = self.led_by(plan, t, x, u)?.0.ok_or(Failure::Nothing)?;
         let backup_plan = self.behind(&moved, t, x, u)?;
