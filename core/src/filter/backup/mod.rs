@@ -135,12 +135,12 @@ impl Filter {
     ///
     /// Assumptions: the plant is the model, its state is measured exactly, and samples are one period apart. If the plant
     /// was seen to differ from the model, and 1.5 times that difference could take it out of a set before the next sample,
-    /// the guarantee is lost for that sample. A sample may be repeated at the same time, come early, or come late by a twentieth
-    /// of a hold. If the time to the next sample changes and is [known](Self::expect_hold), a plan is sought for the new
-    /// one; if none is found, the guarantee is lost. A sample that comes later suspends it until the next one. While x is
-    /// not finite, the plan continues as it is. A barrier without a deadline that [begins later](Begin::At) is promised from
-    /// then on. A filter with bounds on disturbance or measurement errors, a delay, or a deadline for a barrier that begins
-    /// later cannot be assured yet, and is refused. Sets must not move, unless [it is
+    /// the guarantee is lost for that sample. A sample may be repeated at the same time, come early, or come late by a
+    /// twentieth of a hold. If the time to the next sample changes and is [known](Self::expect_hold), a plan is sought for
+    /// the new one; if none is found, the guarantee is lost. A sample that comes later suspends it until the next one. While
+    /// x is not finite, the plan continues as it is. A barrier without a deadline that [begins later](Begin::At) is promised
+    /// from then on. A filter with bounds on disturbance or measurement errors, a delay, or a deadline for a barrier that
+    /// begins later cannot be assured yet, and is refused. Sets must not move, unless [it is
     /// known](crate::barrier::Barrier::range_from) how low h gets: at an equilibrium each set is checked at eight later
     /// times, up to a day, and no plan is found if it has moved. With a [horizon](Plans::horizon) they may move, and the
     /// plant needs no equilibrium: the promise then has an [end](Assurance::until), which is postponed again and again.

@@ -519,8 +519,8 @@ impl Rows {
         Ok((row_derivative, derivative))
     }
 
-    /// The derivative of the bounds of barrier `i` at the fixed input `u`, from its derivatives where the input begins to act and
-    /// from their `change`.
+    /// The derivative of the bounds of barrier `i` at the fixed input `u`, from its derivatives where the input begins to
+    /// act and from their `change`.
     fn bound_change(
         &self,
         i: usize,

@@ -240,8 +240,8 @@ impl Walk<'_> {
         self.model.flow(x, u, left);
     }
 
-    /// Whether requirement `i` is met as the states move on, each by its motion, for `windows` windows of time. For a set that
-    /// moves, or a source without enclosures, it is checked at instants.
+    /// Whether requirement `i` is met as the states move on, each by its motion, for `windows` windows of time. For a set
+    /// that moves, or a source without enclosures, it is checked at instants.
     fn stays_ahead(&self, i: usize, ahead: &[(f64, Motion)], windows: f64) -> bool {
         let Requirement { model, from, .. } = self.requirements[i];
         let begin = self.t.max(from);
