@@ -1,9 +1,8 @@
 //! Lie derivatives of a barrier along a plant, of any order, by Taylor jets.
 //!
-//! Let x(t₀ + τ) solve `ẋ = f(x) + g(x) u` with a *constant* u. Its Taylor coefficients follow one
-//! after the other from `(k+1) x_{k+1} = [f(x) + g(x) u]_k`; then `h(t, x)` evaluated on that series
-//! has the coefficients `h⁽ᵏ⁾(t₀)/k!`. Series are taken at u = 0 with their derivatives along u
-//! (`Response`), so that at relative degree n
+//! Let x(t₀ + τ) solve `ẋ = f(x) + g(x) u` with a *constant* u. Its Taylor coefficients follow one after the other from
+//! `(k+1) x_{k+1} = [f(x) + g(x) u]_k`; then `h(t, x)` evaluated on that series has the coefficients `h⁽ᵏ⁾(t₀)/k!`. Series
+//! are taken at u = 0 with their derivatives along u (`Response`), so that at relative degree n
 //!
 //! ```math
 //! \begin{align}
@@ -65,7 +64,7 @@ where
     barrier.value(Response::time(t), &motion(plant, x))
 }
 
-/// The Taylor series of the states from `x` on with u = 0, `K` coefficients, each with its derivatives along the inputs.
+/// The Taylor series of the states from `x` with u = 0, `K` coefficients, each with its derivatives along the inputs.
 #[inline]
 fn motion<P, const NX: usize, const NU: usize, const K: usize>(
     plant: &P,
@@ -87,8 +86,8 @@ where
     series
 }
 
-/// Coefficient `J` of the state from those below: `J x_J = [f(x)]_{J−1} + [g(x)]_{J−1} u` at u = 0, where
-/// products of u with derivatives of g along u vanish. Every series is cut off after its last known coefficient.
+/// Coefficient `J` of the state from the lower ones: `J x_J = [f(x)]_{J−1} + [g(x)]_{J−1} u` at u = 0, where products of u
+/// with derivatives of g along u vanish. Every series is cut off after its last known coefficient.
 #[inline]
 fn extend<P, const NX: usize, const NU: usize, const K: usize, const J: usize>(
     plant: &P,
@@ -114,7 +113,7 @@ pub struct Derivatives {
     pub drift: [f64; MAX_RELATIVE_DEGREE + 1],
     /// L_g L_f^(n−1) h, in `[h]`/(s^n · unit of u); zeros above the number of inputs.
     pub row: [f64; MAX_INPUTS],
-    /// Σ |∂h⁽ᵏ⁾/∂u_i| over k < n and all inputs: 0 where the declared relative degree is right.
+    /// Σ |∂h⁽ᵏ⁾/∂u_i| over k < n and all inputs: 0 if the declared relative degree is right.
     pub lower_sensitivity: f64,
 }
 
@@ -130,7 +129,7 @@ impl Derivatives {
     }
 }
 
-/// A barrier along a plant; `K` = n + 1 Taylor coefficients are taken, `N` = n for a row over the period.
+/// A barrier along a plant, with `K` = n + 1 Taylor coefficients, and `N` = n for a row over the period.
 struct Along<P, B, const NX: usize, const NU: usize, const K: usize, const N: usize> {
     plant: P,
     barrier: B,
@@ -142,7 +141,7 @@ where
     P: ControlAffine<NX, NU>,
     B: Barrier<NX>,
 {
-    /// Writes the derivatives as the coefficients of `h` give them.
+    /// Writes the derivatives given by the coefficients of `h`.
     #[inline(always)]
     fn write(h: &Response<NU, K>, out: &mut Derivatives) {
         *out = Derivatives::ZERO;
@@ -285,7 +284,7 @@ where
     }
 
     fn lowest_held(&self, t: f64, x: &[f64], u: &[f64], duration: f64, wanted: f64) -> Option<f64> {
-        // With n > 1 the derivatives at the ends of a hold tell as much of such an h, for less.
+        // With n > 1 the derivatives at the ends of a hold show as much of such an h, at a lower cost.
         if B::ONE_SIDED_CURVATURE && P::SLOW_CURVATURE && K > 2 {
             return None;
         }
@@ -295,7 +294,7 @@ where
 
     fn is_still(&self, x: &[f64]) -> Option<bool> {
         let x = from_fn(|i| Interval::from(x[i]));
-        // Where time is not used, the bits are the same.
+        // If time is not used, the bits are the same.
         Some(self.barrier.value(Interval::ALL, &x) == self.barrier.value(Interval::from(0.0), &x))
     }
 
@@ -343,7 +342,7 @@ where
     }
 }
 
-/// What a room that is not of the plant would break.
+/// The expectation that is violated if a room belongs to another plant.
 const ROOM: &str = "a room that a source along the same plant has made";
 
 impl<P, B, const NX: usize, const NU: usize, const K: usize, const N: usize> Directional
@@ -382,13 +381,13 @@ where
 }
 
 /// The derivatives of `barrier` along `plant` at relative degree `n`, which cannot exceed the plant's
-/// [`LARGEST_DEGREE`](ControlAffine::LARGEST_DEGREE). The number of states is always such a limit, since the gradients
-/// of h, …, h⁽ⁿ⁻¹⁾ are linearly independent (A. Isidori, *Nonlinear Control Systems*, lemma 4.1.1).
+/// [`LARGEST_DEGREE`](ControlAffine::LARGEST_DEGREE). The number of states is always such a limit, since the gradients of h,
+/// …, h⁽ⁿ⁻¹⁾ are linearly independent (A. Isidori, *Nonlinear Control Systems*, lemma 4.1.1).
 ///
 /// # Errors
 ///
 /// `n` outside 1 ..= min(`LARGEST_DEGREE`, [`MAX_RELATIVE_DEGREE`]); `NU` above [`MAX_INPUTS`] or zero. Whether `n` *is* the
-/// relative degree is for [`detected`] to say, and checked at every evaluation
+/// relative degree is for [`detected`] to decide. It is also checked at every evaluation
 /// ([`Derivatives::lower_sensitivity`]).
 pub fn along<P, B, const NX: usize, const NU: usize>(
     plant: P,
@@ -414,7 +413,7 @@ where
     by_degree!(1 => 2, 2 => 3, 3 => 4, 4 => 5, 5 => 6, 6 => 7, 7 => 8, 8 => 9)
 }
 
-/// `inputs`, a possible number of inputs.
+/// `inputs`, if it is a possible number of inputs.
 fn checked_inputs(inputs: usize) -> Result<usize, Error> {
     if (1..=MAX_INPUTS).contains(&inputs) {
         return Ok(inputs);
@@ -423,7 +422,7 @@ fn checked_inputs(inputs: usize) -> Result<usize, Error> {
     Err(Error::new(ErrorKind::Dimension, "u", message))
 }
 
-/// `n`, a possible relative degree.
+/// `n`, if it is a possible relative degree.
 fn checked_degree(n: usize) -> Result<usize, Error> {
     if (1..=MAX_RELATIVE_DEGREE).contains(&n) { Ok(n) } else { Err(no_degree(n, MAX_RELATIVE_DEGREE)) }
 }

@@ -1,4 +1,4 @@
-//! The condition in force until the set is reached: one of the methods, or a user's own.
+//! The condition in force until the set is reached: one of the methods, or a custom one.
 
 use alloc::borrow::ToOwned;
 use alloc::sync::Arc;
@@ -16,7 +16,7 @@ pub(super) enum Approach {
     Profile(ReferenceProfile),
     /// [`Method::RepeatedRoot`].
     Root(RepeatedRoot),
-    /// A user's own.
+    /// A custom condition.
     Own(Arc<dyn Condition + Send + Sync>),
 }
 
@@ -70,7 +70,7 @@ impl Approach {
         }
     }
 
-    /// Whether it is a user's own.
+    /// Whether it is a custom condition.
     pub(super) fn is_own(&self) -> bool {
         matches!(self, Self::Own(_))
     }

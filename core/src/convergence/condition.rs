@@ -1,12 +1,11 @@
 //! The trait that every constraint implements: a floor under h⁽ⁿ⁾ that is known from h, …, h⁽ⁿ⁻¹⁾.
 //!
-//! One file per method implements [`Condition`]: `reference_profile`,
-//! [`repeated_root`](super::repeated_root) on the way to the set, [`stay`](super::stay) inside it. A user's own condition takes
-//! the place of the first two
-//! ([`FixedTime::with_condition`](super::FixedTime::with_condition)); all else of a filter stays as it is.
+//! One file per method implements [`Condition`]: `reference_profile` and [`repeated_root`](super::repeated_root) on the way
+//! to the set, [`stay`](super::stay) inside it. A custom condition replaces the first two
+//! ([`FixedTime::with_condition`](super::FixedTime::with_condition)); the rest of a filter stays as it is.
 //!
-//! A new method is a file here that implements the trait, a variant of [`Method`](super::Method) and one of
-//! `Approach`, which makes the one from the other.
+//! A new method is a file here that implements the trait, a variant of [`Method`](super::Method) and one of `Approach`,
+//! which makes the one from the other.
 
 use super::comparison::Stack;
 use super::fixed_time::Refusal;
@@ -24,7 +23,7 @@ pub(super) const EXACT: Stack = [0.0; MAX_RELATIVE_DEGREE];
 pub struct Sample<'a> {
     /// e⁽ʲ⁾ at the anchor, `[h]`/sʲ, j < n.
     pub anchor: &'a [f64],
-    /// T in s, counted from the anchor: infinite where there is none, ≤ 0 where it had passed at the anchor.
+    /// T in s, counted from the anchor: infinite if there is none, ≤ 0 if it had passed at the anchor.
     pub deadline: f64,
     /// τ ≥ 0, the time in s since the anchor.
     pub elapsed: f64,
@@ -38,9 +37,9 @@ pub struct Sample<'a> {
     pub rate: f64,
     /// The part of the floor that leads back to a larger margin, `[h]`/sⁿ. Of the stay constraint only. Default: 0.
     pub pull: f64,
-    /// Whether [`Condition::anchor`] fell back on something else. Default: false.
+    /// Whether [`Condition::anchor`] fell back on another choice. Default: false.
     pub fallback: bool,
-    /// Whether the theorem behind the condition applied at the sample before. Default: true.
+    /// Whether the theorem behind the condition applied at the previous sample. Default: true.
     pub on_course: bool,
 }
 
@@ -83,10 +82,10 @@ impl<'a> Sample<'a> {
 /// The floor that a condition sets at a sample, and what it promises.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bound {
-    /// The least h⁽ⁿ⁾ allowed, `[h]`/sⁿ. One that is not finite is reported as
-    /// [`Status::Singular`](crate::filter::Status::Singular).
+    /// The least h⁽ⁿ⁾ allowed, `[h]`/sⁿ. If it is not finite, [`Status::Singular`](crate::filter::Status::Singular) is
+    /// reported.
     pub floor: f64,
-    /// The lower bound on e that the condition promises now, `[h]`; −∞ where it promises none.
+    /// The lower bound on e that the condition promises now, `[h]`; −∞ if it promises none.
     pub lower: f64,
     /// Whether the theorem behind the condition applies from this sample on.
     pub applies: bool,
@@ -105,17 +104,17 @@ impl Bound {
 pub struct Anchoring<'a> {
     /// h⁽ʲ⁾, `[h]`/sʲ, j < n.
     pub h: &'a [f64],
-    /// T in s from now; ≤ 0 where it has passed.
+    /// T in s from now; ≤ 0 if it has passed.
     pub deadline: f64,
-    /// The time in s for which inputs are held; 0 where they are not, or where it is not known.
+    /// The time in s for which inputs are held; 0 if they are not, or if it is not known.
     pub period: f64,
-    /// The margin asked for, `[h]`: that of the settings, or what a plan behind the constraint needs.
+    /// The requested margin, `[h]`: that of the settings, or the one that a plan behind the constraint needs.
     pub margin: f64,
     /// The default rate for this deadline and period, 1/s.
     pub default_rate: f64,
     /// The rate of the stay constraint, 1/s.
     pub stay_rate: f64,
-    /// Whether the set is to be kept from now on, and not to be reached.
+    /// Whether the set is to be kept from now on, rather than to be reached.
     pub keeps: bool,
 }
 
@@ -137,11 +136,11 @@ impl Anchoring<'_> {
 /// The choice of a condition at an anchor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Anchored {
-    /// μ in `[h]`: the margin asked for and the expected cost of held inputs.
+    /// μ in `[h]`: the requested margin plus the expected cost of held inputs.
     pub margin: f64,
     /// a in 1/s.
     pub rate: f64,
-    /// Whether the method could not be used from here, and another took its place.
+    /// Whether the method could not be used from here, so that another replaced it.
     pub fallback: bool,
     /// Whether its theorem applies.
     pub applies: bool,
@@ -151,18 +150,18 @@ pub struct Anchored {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Abilities {
-    /// The stay constraint takes over inside the set. Without it the condition is enforced for ever, and the phases tell
-    /// only what is seen.
+    /// The stay constraint takes over inside the set. Without this, the condition is enforced for ever, and the phases only
+    /// report what is seen.
     pub hands_over: bool,
-    /// Its margin covers the cost of held inputs, and changes where samples turn out to be further apart.
+    /// Its margin covers the cost of held inputs, and changes if samples turn out to be farther apart.
     pub covers_holds: bool,
     /// Its bound allows for [errors](Sample::errors) of the derivatives.
     pub allows_errors: bool,
-    /// It may restart on the way at any time, and its theorem then applies again.
+    /// It may restart at any time during the approach, and its theorem then applies again.
     pub restarts: bool,
 }
 
-/// The derivative of an anchor where h moves at the sample that anchors.
+/// The derivative of an anchor as h moves at the anchoring sample.
 #[derive(Clone, Copy, Debug, Default)]
 #[non_exhaustive]
 pub struct AnchorChange {
@@ -186,8 +185,8 @@ pub enum Rates {
 /// A constraint h⁽ⁿ⁾ ≥ φ for a barrier of relative degree n.
 ///
 /// It has no state: all that it depends on is in its arguments, and the same arguments give the same bits. Only
-/// [`bound`](Self::bound) is required. The defaults are those of a condition without a theorem, enforced at the
-/// samples only.
+/// [`bound`](Self::bound) is required. The defaults are those of a condition without a theorem, enforced only at the
+/// samples.
 pub trait Condition {
     /// The floor φ at a sample, and what it promises.
     fn bound(&self, at: &Sample) -> Bound;
@@ -202,13 +201,13 @@ pub trait Condition {
         Anchored { margin: at.margin, rate: at.stay_rate, fallback: false, applies: false }
     }
 
-    /// The reason why it [fell back](Anchored::fallback) at the anchor of `at`.
+    /// Why it [fell back](Anchored::fallback) at the anchor of `at`.
     fn refusal(&self, _at: &Sample) -> Option<Refusal> {
         None
     }
 
-    /// The operator, where φ is linear: Π (D + a_i)(h − μ − r) ≥ pull. Such a condition has a form for inputs that are
-    /// held ([`sampled`]).
+    /// The operator, if φ is linear: Π (D + a_i)(h − μ − r) ≥ pull. Such a condition has a form for held inputs
+    /// ([`sampled`]).
     fn rates(&self, _at: &Sample) -> Option<Rates> {
         None
     }
@@ -218,26 +217,26 @@ pub trait Condition {
         [0.0; MAX_RELATIVE_DEGREE + 1]
     }
 
-    /// (S) of [`sampled`] from the sample `at`, where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ and h⁽ⁿ⁾ is disturbed by up to `disturbance`,
-    /// over `period` > 0 seconds; `None` where φ is not linear. It follows from [`rates`](Self::rates) and
-    /// [`profile`](Self::profile), so that there is nothing to define. It is here to be compiled with them.
+    /// (S) of [`sampled`] from the sample `at` over `period` > 0 seconds; `None` if φ is not linear. `h` holds h⁽⁰⁾ …
+    /// h⁽ⁿ⁻¹⁾, and h⁽ⁿ⁾ is disturbed by up to `disturbance`. It follows from [`rates`](Self::rates) and
+    /// [`profile`](Self::profile), so there is nothing to define. It is here to be compiled with them.
     fn over_period(&self, at: &Sample, h: &[f64], period: f64, disturbance: f64) -> Option<PeriodBound> {
         sampled::over_period(self, at, h, period, disturbance)
     }
 
-    /// The derivative of what [`anchor`](Self::anchor) chose where h (`h[0]`) moves along `h[1]`; `None` where it is
-    /// not known. `period` is that of the anchor.
+    /// The derivative of the choice of [`anchor`](Self::anchor) as h (`h[0]`) moves along `h[1]`; `None` if it is not known.
+    /// `period` is that of the anchor.
     fn anchor_change(&self, _at: &Sample, _h: [&[f64]; 2], _period: f64) -> Option<AnchorChange> {
         None
     }
 
-    /// The derivatives of the floor and of the lower bound on e where e moves along `de`, and the anchor by `change` if
-    /// this is its sample. `None` where they are not known.
+    /// The derivatives of the floor and of the lower bound on e as e moves along `de`, and the anchor by `change` if this is
+    /// its sample. `None` if they are not known.
     fn bound_change(&self, _at: &Sample, _change: Option<&AnchorChange>, _de: &[f64]) -> Option<[f64; 2]> {
         None
     }
 
-    /// The derivative of [`profile`](Self::profile) where the anchor changes by `change`; `None` where it is not known.
+    /// The derivative of [`profile`](Self::profile) as the anchor changes by `change`; `None` if it is not known.
     fn profile_change(&self, _at: &Sample, _change: &AnchorChange, _elapsed: f64) -> Option<Derivatives> {
         None
     }

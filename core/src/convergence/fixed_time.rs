@@ -21,7 +21,7 @@ use crate::error::{Error, ErrorKind, positive};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct DerivativeBound {
-    /// The least h⁽ⁿ⁾ of the model allowed, `[h]`/sⁿ: the floor of the constraint, and the disturbance on top.
+    /// The least h⁽ⁿ⁾ of the model allowed, `[h]`/sⁿ: the floor of the constraint plus the disturbance.
     pub floor: f64,
     /// The lower bound on h that the constraint promises now, `[h]`.
     pub profile: f64,
@@ -30,19 +30,18 @@ pub struct DerivativeBound {
 }
 
 impl DerivativeBound {
-    /// The bound that asks for nothing.
+    /// The bound that requires nothing.
     pub const NONE: Self = Self { floor: f64::NEG_INFINITY, profile: 0.0, time_left: 0.0 };
 }
 
-/// The reason why the configured method cannot be used from an anchor.
+/// Why the configured method cannot be used from an anchor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// The repeated root has no admissible rate. In its place: (D + a)ⁿ (h − μ) ≥ 0 with the stay rate. That
-    /// leads towards the set without a deadline, and guarantees nothing until the stay constraint takes over.
+    /// The repeated root has no admissible rate. It is replaced by (D + a)ⁿ (h − μ) ≥ 0 with the stay rate. That leads
+    /// towards the set without a deadline, and guarantees nothing until the stay constraint takes over.
     NoAdmissibleRate(NoAdmissibleRate),
-    /// The custom profile fails its check from this anchor. In its place: the Hermite profile, with its
-    /// guarantee.
+    /// The custom profile fails its check from this anchor. It is replaced by the Hermite profile, with its guarantee.
     Profile(ProfileError),
 }
 
@@ -85,8 +84,8 @@ impl FixedTime {
         Ok(Self { n, settings, approach: Approach::new(&settings) })
     }
 
-    /// The same promise along a custom profile. It is [checked](super::profile::check) at every anchor,
-    /// some 3000 evaluations; one that fails is [refused](Refusal::Profile).
+    /// The same promise along a custom profile. It is [checked](super::profile::check) at every anchor, with about 3000
+    /// evaluations. A profile that fails is [refused](Refusal::Profile).
     ///
     /// # Errors
     ///
@@ -99,11 +98,10 @@ impl FixedTime {
         Ok(Self { approach: Approach::Profile(reference.along(Arc::new(profile))), ..self })
     }
 
-    /// A custom constraint in place of the settings' method. Of the settings only deadline, margin and
-    /// disturbance count. Unless its [abilities](super::condition::Abilities) say otherwise, nothing is guaranteed
-    /// and the phases tell what is seen ([`Phase::Stay`]: h ≥ 0, [`Phase::Left`]: outside again). Unless it gives its
-    /// [rates](Condition::rates), it is enforced at the samples only, under any
-    /// [`Sampling`](crate::filter::Sampling).
+    /// A custom constraint that replaces the settings' method. Of the settings only deadline, margin and disturbance count.
+    /// Unless its [abilities](super::condition::Abilities) say otherwise, nothing is guaranteed and the phases report what
+    /// is seen ([`Phase::Stay`]: h ≥ 0, [`Phase::Left`]: outside again). Unless it gives its [rates](Condition::rates), it
+    /// is enforced only at the samples, under any [`Sampling`](crate::filter::Sampling).
     ///
     /// # Errors
     ///
@@ -133,7 +131,7 @@ impl FixedTime {
         self.approach.is_own()
     }
 
-    /// The same promise with another deadline in s, for anchors to come.
+    /// The same promise with another deadline in s, for future anchors.
     ///
     /// # Errors
     ///
@@ -149,7 +147,7 @@ impl FixedTime {
         self.n
     }
 
-    /// T in s from the anchor, infinite where there is none.
+    /// T in s from the anchor, infinite if there is none.
     pub fn deadline(&self) -> f64 {
         self.settings.deadline.unwrap_or(f64::INFINITY)
     }
@@ -169,8 +167,8 @@ impl FixedTime {
         self.advance_within(state, t, h, &[0.0; MAX_RELATIVE_DEGREE])
     }
 
-    /// As [`Self::advance`], where h⁽ᵏ⁾ is known to `errors[k]` ≥ 0. A theorem starts from the smallest derivatives
-    /// there can be, and ends where h < 0 for certain. Arrival stays that of `h` as it is given.
+    /// As [`Self::advance`], if h⁽ᵏ⁾ is known up to `errors[k]` ≥ 0. A theorem starts from the smallest possible
+    /// derivatives, and ends when h < 0 for certain. Arrival remains that of the given `h`.
     pub(crate) fn advance_within(
         &self,
         state: &mut FixedTimeState,
@@ -181,7 +179,7 @@ impl FixedTime {
         self.advance_by(state, t, h, errors, &Means { hold: state.period, ..Means::UNKNOWN })
     }
 
-    /// As [`Self::advance_within`], with the stay rate chosen for what plant and inputs can do (`means`).
+    /// As [`Self::advance_within`], with the stay rate chosen for the influence of plant and inputs (`means`).
     pub(crate) fn advance_by(
         &self,
         state: &mut FixedTimeState,
@@ -215,19 +213,19 @@ impl FixedTime {
         let h: &[f64; N] = h.first_chunk().expect("n derivatives");
         let lowest: [f64; N] = from_fn(|k| h[k] - errors[k]);
         let is_outside = h[0] + errors[0] < 0.0;
-        // Anchor at the first sample, and again where a set that has a recovery time was left.
+        // Anchor at the first sample, and again if a set that has a recovery time was left.
         if state.phase == Phase::Waiting {
             self.anchor(state, t, &lowest, self.deadline(), 0.0);
         }
         let was_left = state.phase == Phase::Stay && is_outside;
         if let Some(recovery) = self.settings.recovery.filter(|_| was_left) {
-            // What was to be reached may be left again while its deadline, which is kept, is ahead.
+            // A set that was to be reached may be left again while its deadline, which is kept, is ahead.
             let left = state.deadline - state.elapsed(t);
             let stands = state.recoveries == 0 && !state.was_inside() && left > 0.0;
             self.anchor(state, t, &lowest, if stands { left } else { recovery }, state.period);
             state.recoveries = state.recoveries.saturating_add(u32::from(!stands));
         }
-        // Note the arrival, and move on to the phase that begins here.
+        // Record the arrival, and change to the phase that begins here.
         let elapsed = state.elapsed(t);
         let is_over = elapsed >= state.deadline;
         if h[0] >= 0.0 && state.arrival.is_none() {
@@ -238,13 +236,13 @@ impl FixedTime {
             let (before, margin) = (state.phase, state.margin);
             state.change_phase(seen, || Stay(&self.settings).can_keep(&lowest, margin, means));
             if (before, state.phase) == (Phase::Approach, Phase::Stay) {
-                // The largest gain is that of the inside from here on: far outside it may have been another.
+                // From here on the largest gain is that inside the set: far outside it may have been different.
                 state.gain *= means.weight;
             }
         } else {
             state.observe(Seen { is_inside: h[0] >= 0.0, ..seen });
         }
-        // The floor of the condition in force. Leaving the set breaks its promise, even where a new one begins here.
+        // The floor of the condition in force. Leaving the set breaks its promise, even if a new one begins here.
         let (floor, profile) = self.enforce(state, elapsed, h, &lowest, errors, means);
         state.on_course &= !was_left;
         let floor = floor + self.settings.disturbance;
@@ -253,7 +251,7 @@ impl FixedTime {
         DerivativeBound { floor, profile, time_left }
     }
 
-    /// The floor under h⁽ⁿ⁾ and the bound on h of the condition in force. Notes in `state` whether its theorem applies.
+    /// The floor under h⁽ⁿ⁾ and the bound on h of the condition in force. Records in `state` whether its theorem applies.
     #[inline(always)]
     fn enforce<const N: usize>(
         &self,
@@ -317,9 +315,9 @@ impl FixedTime {
         }
     }
 
-    /// (S) of [`sampled`](super::sampled) from the sample at `t` (s), which `state` has been moved to with [`advance`](Self::advance) and
-    /// where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾, over `period` > 0 seconds. `None` under a condition that is not linear in e, as most of a
-    /// user's own.
+    /// (S) of [`sampled`](super::sampled) from the sample at `t` (s), to which [`advance`](Self::advance) has moved `state`
+    /// and at which `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾, over `period` > 0 seconds. `None` under a condition that is not linear in e, as
+    /// are most custom ones.
     pub fn over_period(&self, state: &FixedTimeState, t: f64, h: &[f64], period: f64) -> Option<PeriodBound> {
         self.in_force(state, t, h, |condition, at| {
             condition.over_period(at, h, period, self.settings.disturbance)
@@ -331,8 +329,8 @@ impl FixedTime {
         Stay(&self.settings).is_even(state)
     }
 
-    /// The reason why another method than the configured one is in force since the anchor in `state`. `None` where
-    /// it is the configured one, and before the anchor. Recomputed at every call: not for every step.
+    /// Why another method than the configured one has been in force since the anchor in `state`. `None` if it is the
+    /// configured one, and before the anchor. Recomputed at every call: not for every step.
     pub fn refusal(&self, state: &FixedTimeState) -> Option<Refusal> {
         if !state.fallback || state.phase == Phase::Waiting {
             return None;
@@ -340,12 +338,12 @@ impl FixedTime {
         self.approach.condition().refusal(&state.at_anchor(self.n))
     }
 
-    /// Restarts the promise at time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ (finite): the barrier is to
-    /// be reached within `deadline` seconds from there, with inputs held for `period` ≥ 0 seconds (0: not
-    /// held, or not known). The count of recoveries goes on.
+    /// Restarts the promise at time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ (finite): the barrier is to be reached within
+    /// `deadline` seconds from there, with inputs held for `period` ≥ 0 seconds (0: not held, or not known). The count of
+    /// recoveries continues.
     ///
-    /// A deadline ≤ 0 is past already: nothing is guaranteed, the phase of the next [`Self::advance`] is
-    /// [`Phase::Late`] where h < 0, and the target is h = μ at once, approached with the rate.
+    /// A deadline ≤ 0 has already passed: nothing is guaranteed, the phase of the next [`Self::advance`] is [`Phase::Late`]
+    /// if h < 0, and the target is h = μ at once, approached with the rate.
     pub fn anchor(&self, state: &mut FixedTimeState, t: f64, h: &[f64], deadline: f64, period: f64) {
         let settings = &self.settings;
         let allowed = if deadline <= 0.0 { self.deadline() } else { deadline };
@@ -381,10 +379,10 @@ impl FixedTime {
         };
     }
 
-    /// Takes into account, on the way, that inputs are held for `period` > 0 seconds. Margin and default rates
-    /// become what they would have been had it been known at the anchor. With the reference profile h − μ − r
-    /// changes by at most C(2n − 1, n) (elapsed/T)ⁿ times the change of the margin (`docs/theory.md#period`). Other
-    /// methods take none.
+    /// Accounts, during the approach, for inputs that are held for `period` > 0 seconds. Margin and default rates become
+    /// what they would have been if that had been known at the anchor. With the reference profile h − μ − r changes by at
+    /// most C(2n − 1, n) (elapsed/T)ⁿ times the change of the margin (`docs/theory.md#period`). Other methods do not account
+    /// for it.
     pub(crate) fn resample(&self, state: &mut FixedTimeState, period: f64) {
         if !self.approach.abilities().covers_holds {
             return;
@@ -396,19 +394,20 @@ impl FixedTime {
         (state.arrival, state.on_course, state.phase, state.gain) = (arrival, on_course, phase, gain);
     }
 
-    /// Restarts the condition from the sample at time `t` (s) if its theorem has been lost on the way there. `state`
-    /// has been moved to that sample, and `h` holds the smallest h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ there. The deadline stays the same. The
-    /// error is zero again, so the theorem applies again. Returns whether it restarted.
+    /// Restarts the condition from the sample at time `t` (s) if its theorem was lost on the way there. `state` has been
+    /// moved to that sample, and `h` holds the smallest h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ there. The deadline stays the same. The error is zero
+    /// again, so the theorem applies again. Returns whether it restarted.
     ///
-    /// It does not shortly before the deadline, where a profile from anywhere would ask for any input, nor along a
+    /// It does not restart shortly before the deadline, where a profile from anywhere would require any input, nor along a
     /// custom profile, whose check takes long.
     pub(crate) fn restart(&self, state: &mut FixedTimeState, t: f64, h: &[f64], period: f64) -> bool {
-        /// Samples, and part of the configured deadline, that must be left.
+        /// Number of samples that must be left.
         const SAMPLES: f64 = 10.0;
+        /// Part of the configured deadline that must be left.
         const PART: f64 = 0.05;
         let left = state.deadline - (t - state.anchor_time);
         let lost = state.phase == Phase::Approach && !state.on_course && h[0] < 0.0 && t > state.anchor_time;
-        // Without a period inputs are not held, or not known to be: there is no theorem to win back.
+        // Without a period, inputs are not held, or not known to be: there is no theorem to regain.
         if !lost
             || period <= 0.0
             || !self.approach.abilities().restarts

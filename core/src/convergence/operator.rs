@@ -49,7 +49,7 @@ fn lower_coefficients(rates: &[f64]) -> Stack {
 /// Π (D + a_i) e = (D + `last`) Σ_k `weights[k]` e⁽ᵏ⁾.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Split {
-    /// Coefficients for n − 1 rates, the leading 1 among them; zeros above.
+    /// Coefficients for n − 1 rates, including the leading 1; zeros above.
     pub(super) weights: Stack,
     /// a_n in 1/s.
     pub(super) last: f64,
@@ -108,13 +108,12 @@ impl Operator {
         Split { weights, last }
     }
 
-    /// Whether Π (D + a_i) e ≥ 0 keeps e ≥ 0 for ever from `e`: all ψ_i ≥ 0, i < n, the rates taken in
-    /// the order given.
+    /// Whether Π (D + a_i) e ≥ 0 keeps e ≥ 0 for ever from `e`: all ψ_i ≥ 0, i < n, with the rates in the order given.
     pub fn is_invariant(&self, e: &[f64]) -> bool {
         let mut cascade = [0.0; MAX_RELATIVE_DEGREE];
         cascade[..self.n].copy_from_slice(&e[..self.n]);
         for i in 0..self.n {
-            // Not `< 0`: a value that is not a number fails as well.
+            // Not `< 0`: NaN fails as well.
             if !matches!(cascade[0].partial_cmp(&0.0), Some(o) if o.is_ge()) {
                 return false;
             }
@@ -127,7 +126,7 @@ impl Operator {
 }
 
 impl Operator {
-    /// The largest μ, negative where there is none ≥ 0, for which e − μ satisfies [`Self::is_invariant`] from `e`.
+    /// The largest μ for which e − μ satisfies [`Self::is_invariant`] from `e`; negative if there is none ≥ 0.
     pub(super) fn affordable_margin(&self, e: &[f64]) -> f64 {
         let mut cascade = [0.0; MAX_RELATIVE_DEGREE];
         cascade[..self.n].copy_from_slice(&e[..self.n]);
@@ -151,7 +150,7 @@ impl Operator {
 impl TryFrom<Vec<f64>> for Operator {
     type Error = Error;
 
-    /// [`Self::new`], for what is read from a file.
+    /// [`Self::new`], for data read from a file.
     fn try_from(rates: Vec<f64>) -> Result<Self, Error> {
         Self::new(&rates)
     }

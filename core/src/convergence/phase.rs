@@ -1,4 +1,4 @@
-//! The phases of a promise, and the samples that move it on (docs/theory.md, sections 6 and 8). Knows no method.
+//! The phases of a promise, and the samples at which they change (docs/theory.md, sections 6 and 8). Knows no method.
 
 use super::state::FixedTimeState;
 
@@ -14,15 +14,15 @@ pub enum Phase {
     Waiting = 0,
     /// On the way, before the deadline.
     Approach = 1,
-    /// The deadline passed outside the safe set; the approach goes on.
+    /// The deadline has passed with the state outside the safe set; the approach continues.
     Late = 2,
-    /// To be kept: inside, from the start or since it has been reached, under the stay constraint. Before the deadline a plan
-    /// that decides may leave it once more.
+    /// The set is to be kept under the stay constraint: the state was inside from the start, or has reached it. Before the
+    /// deadline, a plan that decides may leave it once more.
     Stay = 3,
-    /// Outside again after having been inside, with no recovery time set, or outside from the start without a
-    /// deadline; the stay constraint pulls back, without a deadline.
+    /// Outside again after having been inside, with no recovery time set, or outside from the start without a deadline. The
+    /// stay constraint pulls back, without a deadline.
     Left = 4,
-    /// Released: nothing is asked any more ([`End`](crate::filter::End)).
+    /// Released: nothing is required any more ([`End`](crate::filter::End)).
     Released = 5,
 }
 
@@ -31,12 +31,12 @@ impl Phase {
     pub const ALL: [Self; 6] =
         [Self::Waiting, Self::Approach, Self::Late, Self::Stay, Self::Left, Self::Released];
 
-    /// Its name, as the FMU's enumeration has it.
+    /// Its name, as in the FMU's enumeration.
     pub fn name(self) -> &'static str {
         self.words().0
     }
 
-    /// The meaning of the phase, in a few words.
+    /// The meaning of the phase, in brief.
     pub fn meaning(self) -> &'static str {
         self.words().1
     }
@@ -58,7 +58,7 @@ impl Phase {
     }
 }
 
-/// The side of the set that a sample shows, where h is known to an error.
+/// The side of the set that a sample shows, if h is known up to an error.
 #[derive(Clone, Copy)]
 pub(super) struct Seen {
     /// h ≥ 0 for certain.
@@ -70,13 +70,13 @@ pub(super) struct Seen {
 }
 
 impl FixedTimeState {
-    /// Moves on to the phase that begins at this sample. `can_keep`: whether the stay constraint can take over.
+    /// Changes to the phase that begins at this sample. `can_keep`: whether the stay constraint can take over.
     pub(super) fn change_phase(&mut self, seen: Seen, can_keep: impl FnOnce() -> bool) {
         let Seen { is_inside, is_outside, is_over } = seen;
         self.phase = match self.phase {
             Phase::Stay | Phase::Left if is_outside => Phase::Left,
             Phase::Left if is_inside => Phase::Stay,
-            // Until then the approach goes on; from the deadline on it keeps h ≥ 0 too, with r = 0.
+            // Until then the approach continues. From the deadline on it keeps h ≥ 0 too, with r = 0.
             Phase::Approach if can_keep() => Phase::Stay,
             Phase::Late if is_inside => Phase::Stay,
             Phase::Approach | Phase::Late if is_over && is_outside => Phase::Late,
@@ -85,7 +85,7 @@ impl FixedTimeState {
         self.on_course &= !matches!(self.phase, Phase::Late | Phase::Left);
     }
 
-    /// Moves on to the phase that h itself shows, under a condition that is enforced for ever.
+    /// Changes to the phase that h itself shows, under a condition that is enforced for ever.
     pub(super) fn observe(&mut self, seen: Seen) {
         self.phase = match self.arrival {
             _ if seen.is_inside => Phase::Stay,

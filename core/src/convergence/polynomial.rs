@@ -157,13 +157,13 @@ pub(super) fn first(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     }
 }
 
-/// As [`first`], in few looks where that number is next to `guess`.
+/// As [`first`], with few evaluations if that number is next to `guess`.
 pub(super) fn first_near(guess: f64, low: f64, high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     if !(low < guess && guess < high) {
         return first(low, high, holds);
     }
     let (mut low, mut high) = (low, high);
-    // Away from the guess by steps that grow, until one is on the other side.
+    // Away from the guess in growing steps, until one is on the other side.
     let (place, is_above) = (rank(guess), holds(guess));
     let (mut near, mut step) = (guess, 1_i64);
     loop {

@@ -7,13 +7,13 @@
 //! \prod_{i\le n} (D + a_i)\, (e - r) \ge 0, \qquad a_i > 0 \tag{P}
 //! ```
 //!
-//! keeps e ≥ r for ever (`docs/theory.md#profile`), and so e ≥ 0 from T on. [`Hermite`] is one such r. Another may
-//! leave faster, arrive inside, or wait.
+//! keeps e ≥ r for ever (`docs/theory.md#profile`), and so e ≥ 0 from T on. [`Hermite`] is one such r. Another may leave
+//! faster, arrive inside, or wait.
 //!
-//! **The check.** Whether a function is the derivative of another is decided by the fundamental
-//! theorem, independently of how either was written: r⁽ᵏ⁻¹⁾(b) − r⁽ᵏ⁻¹⁾(a) against ∫ r⁽ᵏ⁾ by Gauss' rule
-//! with five nodes (exact to degree 9). The rule on the two halves tells its own error, which is allowed
-//! tenfold; so a kink inside a panel is not mistaken for a contradiction.
+//! **The check.** Whether a function is the derivative of another is decided by the fundamental theorem, independently of
+//! how either was written: r⁽ᵏ⁻¹⁾(b) − r⁽ᵏ⁻¹⁾(a) against ∫ r⁽ᵏ⁾ by Gauss' rule with five nodes (exact to degree 9). The rule
+//! on the two halves shows its own error, and ten times that error is allowed; so a kink inside a panel is not mistaken for
+//! a contradiction.
 //!
 //! # Requirements
 //!
@@ -29,14 +29,14 @@ use crate::elementary;
 /// r and its derivatives, `[e]`/s^k; entries above the order in use are ignored.
 pub type Derivatives = [f64; MAX_RELATIVE_DEGREE + 1];
 
-/// A way from every anchor into the set: a function of time since the anchor that leaves with the
-/// anchor's derivatives and is ≥ 0 from the deadline on.
+/// A trajectory of e from every anchor into the set: a function of the time since the anchor. It leaves with the derivatives
+/// of the anchor and is ≥ 0 from the deadline on.
 pub trait Profile {
     /// r⁽⁰⁾ … r⁽ⁿ⁾ at `elapsed` = τ ≥ 0 in s, from the derivatives `anchor` (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾) within
     /// `deadline` = T > 0 in s; at a jump of r⁽ⁿ⁾, its value after it. The same arguments give the same bits.
     fn evaluate(&self, anchor: &[f64], deadline: f64, elapsed: f64) -> Derivatives;
 
-    /// The derivative of [`Self::evaluate`] where the anchor moves along `direction`; for
+    /// The derivative of [`Self::evaluate`] as the anchor moves along `direction`; for
     /// [`FixedTime::differentiate`](super::FixedTime::differentiate). The default does not know it.
     fn directional(
         &self,
@@ -92,7 +92,7 @@ impl Profile for LowPeak {
         r
     }
 
-    /// Linear but for n = 2, where (B) gives K' (2K + 4w) = 2y₁y₁' − 4Kw' with w = y₀ + y₁/2.
+    /// Linear except for n = 2, where (B) gives K' (2K + 4w) = 2y₁y₁' − 4Kw' with w = y₀ + y₁/2.
     fn directional(
         &self,
         anchor: &[f64],
@@ -200,20 +200,20 @@ struct Anchored<'a> {
     deadline: f64,
 }
 
-/// Checks that `profile` leaves from `anchor` (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾), that its derivatives up to r⁽ⁿ⁾ are each
-/// other's, and that it is ≥ 0 from `deadline` = T > 0 s on, until 3T.
+/// Checks that `profile` leaves from `anchor` (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾), that each derivative up to r⁽ⁿ⁾ is that of the one before,
+/// and that it is ≥ 0 from `deadline` = T > 0 s on, until 3T.
 ///
 /// # Errors
 ///
 /// The first [`ProfileError`] met, in the order of time.
 pub fn check(profile: &dyn Profile, anchor: &[f64], deadline: f64) -> Result<(), ProfileError> {
-    /// Parts of a panel that does not fit.
+    /// Number of parts of a panel that does not fit.
     const SHORT: u32 = 64;
     let n = anchor.len();
     let panel = deadline / 64.0;
     let profile = Anchored { profile, anchor, deadline };
     let start = profile.finite(0.0)?;
-    // Sizes of r⁽ᵏ⁾ Tᵏ decide what is round-off: a derivative that should vanish has no size of its own.
+    // Sizes of r⁽ᵏ⁾ Tᵏ decide what is round-off: a derivative that should vanish has no size itself.
     let size = |r: &Derivatives| {
         (0..=n)
             .fold(f64::MIN_POSITIVE, |m: f64, k| m.max((r[k] * elementary::powi(deadline, k as i32)).abs()))
@@ -234,7 +234,7 @@ pub fn check(profile: &dyn Profile, anchor: &[f64], deadline: f64) -> Result<(),
         let whole = profile.mean(a, b)?;
         let middle = a + (b - a) / 2.0;
         let (first, second) = (profile.mean(a, middle)?, profile.mean(middle, b)?);
-        // Each derivative has the mean that the one before says.
+        // Each derivative has the mean that the previous one implies.
         for order in 1..=n {
             let found = first[order] / 2.0 + second[order] / 2.0;
             let wanted = (right[order - 1] - left[order - 1]) / (b - a);
@@ -242,7 +242,7 @@ pub fn check(profile: &dyn Profile, anchor: &[f64], deadline: f64) -> Result<(),
             if (found - wanted).abs() <= 10.0 * (found - whole[order]).abs() + round_off {
                 continue;
             }
-            // A kink can lie where the two rules agree by chance: not for much shorter ones as well.
+            // A kink may lie where the two rules happen to agree, but not where much shorter ones agree as well.
             let short = (b - a) / f64::from(SHORT);
             let mut refined = 0.0;
             for i in 0..SHORT {

@@ -21,7 +21,7 @@ const MARGIN_TOLERANCE: f64 = 1e-12;
 #[derive(Clone)]
 pub(super) struct ReferenceProfile {
     kind: ProfileKind,
-    /// A custom profile in place of `kind`.
+    /// A custom profile, used instead of `kind`.
     own: Option<Arc<dyn Profile + Send + Sync>>,
     rate: Option<f64>,
     rates: Option<Operator>,
@@ -87,7 +87,7 @@ impl Condition for ReferenceProfile {
             lowest[k] = error[k] - at.errors[k];
         }
         let (error, lowest) = (&error[..n], &lowest[..n]);
-        // The lemma applies with what is left of the margin: h ≥ r from this sample on, if the constraint holds.
+        // The lemma applies with the remaining margin: h ≥ r from this sample on, if the constraint holds.
         let left = at.margin
             + match &self.rates {
                 Some(rates) => rates.affordable_margin(lowest),

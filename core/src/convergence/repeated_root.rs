@@ -43,7 +43,7 @@ use super::sampled;
 use crate::MAX_RELATIVE_DEGREE;
 use crate::elementary;
 
-/// The reason why a repeated root has no admissible rate.
+/// Why a repeated root has no admissible rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Reason {
@@ -213,8 +213,8 @@ pub fn uncertainty(rate: f64, e: &[f64], deadline: f64) -> f64 {
     4.0 * n as f64 * f64::EPSILON * size / (slope.abs() * deadline)
 }
 
-/// The derivative in 1/s of a simple root `rate` of (R) where the anchor `e` moves along `direction`; not
-/// finite at a double root.
+/// The derivative in 1/s of a simple root `rate` of (R) as the anchor `e` moves along `direction`; not finite at a double
+/// root.
 fn rate_change(rate: f64, e: &[f64], direction: &[f64], deadline: f64) -> f64 {
     let (n, s) = (e.len(), rate * deadline);
     let power = |k: usize| elementary::powi(s, k as i32) / factorial(k);
@@ -236,7 +236,7 @@ const MARGIN_TOLERANCE: f64 = 1e-12;
 impl Condition for RepeatedRoot {
     #[inline(always)]
     fn bound(&self, at: &Sample) -> Bound {
-        // The e that the constraint, active from here on, leads to at the deadline: errors grow with a negative rate.
+        // The e to which the constraint, active from here on, leads at the deadline: errors grow with a negative rate.
         let ahead = lower_bound(at.rate, at.e, at.time_left(0.0));
         let scale = MARGIN_TOLERANCE * (at.anchor[0].abs() + at.margin);
         Bound {

@@ -6,11 +6,10 @@
 //! \psi(t + \delta) \ge \exp(-a_n\delta)\, \psi(t), \tag{S}
 //! ```
 //!
-//! depends on the state that the held input leads to, which a model predicts. If (S) holds at every sample, ψ ≥ 0 at
-//! every sample; for n = 1 that is e ≥ 0. In between e dips by what is of second order in δ
-//! (`docs/theory.md#held-inputs`). The pointwise constraint loses Mδ/aⁿ, of first order, with M the slope of
-//! (D + a)ⁿ e. With ψ_n⁻ the shortfall of the pointwise constraint at the start of the period and
-//! Λ = a_1 ⋯ a_{n−1}, the dip is about
+//! depends on the state to which the held input leads, which a model predicts. If (S) holds at every sample, ψ ≥ 0 at every
+//! sample; for n = 1 that is e ≥ 0. In between e dips by an amount of second order in δ (`docs/theory.md#held-inputs`). The
+//! pointwise constraint loses Mδ/aⁿ, of first order, with M the slope of (D + a)ⁿ e. With ψ_n⁻ the shortfall of the
+//! pointwise constraint at the start of the period and Λ = a_1 ⋯ a_{n−1}, the dip is about
 //!
 //! ```math
 //! \psi \ge -\frac{\psi_n^-\,\delta}{4}, \qquad e \ge -\frac{\psi_n^-\,\delta}{4\,\Lambda} \qquad \text{for } n > 1. \tag{5}
@@ -18,13 +17,12 @@
 //!
 //! [`PeriodBound::loss`] is (5): an estimate to leading order, not a bound, as only the mean slope is seen.
 //!
-//! [`margin`] is twice (5) for the steepest part of the profile, and a part of its size for round-off: what a promise
-//! needs on top of the margin it is given (`docs/theory.md#sampling-margin`). What the plant adds (its own drift,
-//! turning gradients) is only seen on the way, as [`PeriodBound::loss`].
+//! [`margin`] is twice (5) for the steepest part of the profile, plus a part of its size for round-off: what a promise needs
+//! in addition to its given margin (`docs/theory.md#sampling-margin`). What the plant adds (its own drift, turning
+//! gradients) is seen only later, as [`PeriodBound::loss`].
 //!
-//! (S) says nothing about the size of δ against 1/a: for aδ > 1 the profile is followed only at its samples' average.
-//! It needs no root, keeps the sign of a (the repeated root has a < 0) and holds across the deadline, since r⁽ⁿ⁻¹⁾ is
-//! continuous there.
+//! (S) does not limit δ against 1/a: for aδ > 1 the profile is followed only on the average of its samples. It needs no
+//! root, keeps the sign of a (the repeated root has a < 0) and holds across the deadline, since r⁽ⁿ⁻¹⁾ is continuous there.
 
 use super::comparison::{Stack, binomial, factorial};
 use super::condition::{AnchorChange, Condition, Rates, Sample};
@@ -40,26 +38,26 @@ pub struct PeriodBound {
     pub weights: Stack,
     /// The least value at the end of the period, `[h]`/sⁿ⁻¹.
     pub floor: f64,
-    /// Λ: ψ ≥ −c gives e ≥ −c/Λ, in 1/sⁿ⁻¹: aⁿ⁻¹ for a > 0. For a ≤ 0, where errors grow until
-    /// the deadline, (n − 1)! exp(aτ)/τⁿ⁻¹ with the time τ until then.
+    /// Λ: ψ ≥ −c gives e ≥ −c/Λ, in 1/sⁿ⁻¹: aⁿ⁻¹ for a > 0. For a ≤ 0, where errors grow until the deadline, it is (n − 1)!
+    /// exp(aτ)/τⁿ⁻¹ with the time τ until then.
     pub attenuation: f64,
     /// exp(−aδ): `floor` contains Σ_k `weights[k]` h⁽ᵏ⁾(t) times this.
     pub decay: f64,
 }
 
-/// A [`PeriodBound`] with the derivatives at the end of the period put in.
+/// A [`PeriodBound`], evaluated with the derivatives at the end of the period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weighted {
     /// Its slack, in the unit of h⁽ⁿ⁾.
     pub value: f64,
-    /// The size of the terms whose sum the slack is.
+    /// The size of the terms that add up to the slack.
     pub terms: f64,
-    /// Its gradient by the input.
+    /// Its gradient with respect to the input.
     pub normal: [f64; MAX_INPUTS],
 }
 
 impl PeriodBound {
-    /// The bound that asks for nothing.
+    /// The bound that requires nothing.
     pub const ZERO: Self =
         Self { weights: [0.0; MAX_RELATIVE_DEGREE], floor: 0.0, attenuation: 1.0, decay: 0.0 };
 
@@ -68,8 +66,8 @@ impl PeriodBound {
         self.weights == [0.0; MAX_RELATIVE_DEGREE]
     }
 
-    /// The bound as a row on h⁽ⁿ⁾, divided by `divisor`: from h⁽ᵏ⁾ at the end of the period, k < n, and their
-    /// gradients by so many `inputs`.
+    /// The bound as a row on h⁽ⁿ⁾, divided by `divisor`: from h⁽ᵏ⁾ at the end of the period, k < n, and their gradients with
+    /// respect to `inputs` inputs.
     #[inline(always)]
     pub fn weighted(
         &self,
@@ -91,18 +89,17 @@ impl PeriodBound {
         Weighted { value: sum * per, terms: terms * per, normal }
     }
 
-    /// (5): how far e may fall below 0 within the `period` (s), `[h]`, where the pointwise constraint
-    /// has the slack `slack` (`[h]`/sⁿ) at its start. For n = 1 the dip is gone at the end of the period.
+    /// (5): how far e may fall below 0 within the `period` (s), `[h]`, if the pointwise constraint has the slack `slack`
+    /// (`[h]`/sⁿ) at its start. For n = 1 the dip has vanished at the end of the period.
     pub fn loss(&self, slack: f64, period: f64) -> f64 {
         (-slack).max(0.0) * period / 4.0 / self.attenuation
     }
 }
 
-/// The margin in the unit of e that inputs held for `period` > 0 seconds are expected to need along
-/// `profile` from the derivatives `anchor` (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾) within `deadline` > 0 seconds, with
-/// `attenuation` as in [`PeriodBound`].
+/// The margin, in the unit of e, that inputs held for `period` > 0 seconds are expected to need along `profile` from the
+/// derivatives `anchor` (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾) within `deadline` > 0 seconds, with `attenuation` as in [`PeriodBound`].
 pub fn margin(profile: &dyn Profile, anchor: &[f64], deadline: f64, attenuation: f64, period: f64) -> f64 {
-    // A profile of a few samples is followed on average only; the cost is bounded by its own size.
+    // A profile of a few samples is followed only on average; the cost is bounded by its own size.
     let (size, _) = size(anchor, deadline);
     let loss = steepest(profile, anchor, deadline).slope.abs() * period / 2.0 * period / 4.0 / attenuation;
     (2.0 * loss).min(LARGEST_MARGIN * size) + ROUND_OFF * size
@@ -116,7 +113,7 @@ struct Steepest {
     slope: f64,
 }
 
-/// Parts of the deadline that are looked at.
+/// Number of parts of the deadline that are examined.
 const PANELS: usize = 32;
 
 fn panel_start(deadline: f64, i: usize) -> f64 {
@@ -151,8 +148,8 @@ fn size(anchor: &[f64], deadline: f64) -> (f64, usize) {
     largest
 }
 
-/// The derivative of [`margin`] where the anchor (`anchor[0]`) moves along a direction (`anchor[1]`); `None`
-/// where the profile does not know its own.
+/// The derivative of [`margin`] as the anchor (`anchor[0]`) moves along a direction (`anchor[1]`); `None` if the profile
+/// does not know its own derivative.
 pub(super) fn margin_change(
     profile: &dyn Profile,
     [anchor, direction]: [&[f64]; 2],
@@ -172,10 +169,10 @@ pub(super) fn margin_change(
     Some(held + ROUND_OFF * size_change)
 }
 
-/// The largest margin that is taken for held inputs, as a part of the anchor's size.
+/// Largest margin for held inputs, as a part of the anchor's size.
 const LARGEST_MARGIN: f64 = 0.01;
 
-/// Margin for the tolerance of sampled rows and what it adds up to, as a part of the anchor's size.
+/// Margin for the accumulated tolerance of sampled rows, as a part of the anchor's size.
 pub(super) const ROUND_OFF: f64 = 1e-8;
 
 /// The attenuation of a [`PeriodBound`] of (D + a)ⁿ.
@@ -188,7 +185,7 @@ pub(super) fn attenuation(rate: f64, n: usize, time_left: f64) -> f64 {
     }
 }
 
-/// The derivative of [`attenuation`] by the rate.
+/// The derivative of [`attenuation`] with respect to the rate.
 fn attenuation_change(rate: f64, n: usize, time_left: f64) -> f64 {
     let order = n as i32 - 1;
     match n {
@@ -275,8 +272,8 @@ fn over_period_of_degree<C: Condition + ?Sized, const N: usize>(
     Some(PeriodBound { weights, floor, attenuation: cascade.attenuation, decay })
 }
 
-/// The derivative of [`over_period`] where h (`h[0]`) moves along `h[1]`, and the anchor by `change` if this is its sample.
-/// All zero where the condition is not linear. `None` where it is not known.
+/// The derivative of [`over_period`] as h (`h[0]`) moves along `h[1]`, and the anchor by `change` if this is its sample. All
+/// zero if the condition is not linear. `None` if it is not known.
 pub(super) fn over_period_change(
     condition: &dyn Condition,
     at: &Sample,
@@ -316,7 +313,7 @@ pub(super) fn over_period_change(
     Some(out)
 }
 
-/// The derivative by a of C(n, j) a^{n−j}, the coefficient of e⁽ʲ⁾ in (D + a)ⁿ e.
+/// The derivative with respect to a of C(n, j) a^{n−j}, the coefficient of e⁽ʲ⁾ in (D + a)ⁿ e.
 pub(super) fn power_change(rate: f64, n: usize, j: usize) -> f64 {
     let power = n - j;
     if power == 0 { 0.0 } else { binomial(n, j) * power as f64 * elementary::powi(rate, power as i32 - 1) }
@@ -336,7 +333,7 @@ fn disturbed(weights: &[f64], bound: f64, period: f64) -> f64 {
     sum
 }
 
-/// The derivative of [`disturbed`], where `weights` change by `change`.
+/// The derivative of [`disturbed`] as `weights` change by `change`.
 fn disturbed_change(weights: &[f64], change: &Stack, bound: f64, period: f64) -> f64 {
     let n = weights.len();
     let signed: Stack = core::array::from_fn(|k| if k < n { change[k] * weights[k].signum() } else { 0.0 });

@@ -1,8 +1,8 @@
-//! The change of a promise's floors with the derivatives of h.
+//! The derivatives of a promise's floors with respect to the derivatives of h.
 //!
-//! At a sample that does not anchor, [`FixedTime::advance`] and [`FixedTime::over_period`] compute the floors from
-//! h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ with anchor, margin and rates as they are. They are linear functions.
-//! At a sample that anchors, the anchor is h itself; margin and the repeated root follow it:
+//! At a sample that does not anchor, [`FixedTime::advance`] and [`FixedTime::over_period`] compute the floors from h⁽⁰⁾ …
+//! h⁽ⁿ⁻¹⁾ with fixed anchor, margin and rates. They are linear functions. At a sample that anchors, the anchor is h itself;
+//! margin and the repeated root follow it:
 //!
 //! ```text
 //! e = h − μ(h),   r' = (∂r/∂e(0)) e(0)',
@@ -10,12 +10,12 @@
 //! Y_n'(ρ) = −Σ_j y_j ρ^{n−1−j}/(n−1−j)!   for the root of (R),
 //! ```
 //!
-//! where the prime is the derivative along a direction, but that of Y_n the one by ρ
-//! (`docs/theory.md#input-sensitivity`). Where a phase changes, a maximum has two candidates or a profile a kink, it
-//! is the derivative of the piece in force.
+//! where the prime is the derivative along a direction, except that of Y_n, which is the one with respect to ρ
+//! (`docs/theory.md#input-sensitivity`). Where a phase changes, a maximum has two candidates or a profile has a kink, it is
+//! the derivative of the piece in force.
 //!
-//! A set is kept with rate, margin and pull that are chosen at the sample ([`keep`](super::stay::keep)), by cases and roots of
-//! polynomials. Their change is a quotient of differences of that choice alone: a few numbers, no search, no plant.
+//! A set is kept with a rate, a margin and a pull that are chosen at the sample ([`keep`](super::stay::keep)), by cases and
+//! roots of polynomials. Their change is a difference quotient of that choice alone: a few numbers, no search, no plant.
 
 use super::comparison::Stack;
 use super::condition::AnchorChange;
@@ -26,8 +26,8 @@ use super::stay::Means;
 use crate::MAX_RELATIVE_DEGREE;
 use crate::elementary;
 
-/// The difference for the change of a chosen rate, as a part of the size of h and its derivatives, and of h itself: the choice
-/// is smooth on the scale of the one, and near the edge on that of the other.
+/// Differences for the change of a chosen rate, as a part of the size of h and its derivatives, and as a part of h itself:
+/// the choice is smooth on the scale of the former, and near the edge on that of the latter.
 const DIFFERENCE: [f64; 2] = [1e-5, 1e-4];
 
 /// The derivatives of a [`DerivativeBound`](super::DerivativeBound), of the margin and of a [`PeriodBound`] along one
@@ -41,7 +41,7 @@ pub struct BoundDerivative {
     pub profile: f64,
     /// Derivative of μ.
     pub margin: f64,
-    /// Derivative of the sampled form, where a period was given; else zero.
+    /// Derivative of the sampled form if a period was given; otherwise zero.
     pub sampled: PeriodBound,
 }
 
@@ -53,7 +53,7 @@ impl BoundDerivative {
         sampled: PeriodBound { attenuation: 0.0, ..PeriodBound::ZERO },
     };
 
-    /// Adds so much `per` unit of the difference of two bounds.
+    /// Adds `per` times the difference of two bounds.
     fn add(&mut self, less: &Self, more: &Self, per: f64) {
         self.floor += per * (more.floor - less.floor);
         self.profile += per * (more.profile - less.profile);
@@ -67,12 +67,12 @@ impl BoundDerivative {
 }
 
 impl FixedTime {
-    /// The derivative along `dh` of the floors that [`Self::advance`] and, over `period`, [`Self::over_period`] give
-    /// at time `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾. `state` has been moved to that sample; `anchors` says whether
-    /// it was anchored there, at `h` itself, with a deadline that is held. `errors` and `means` are those of
-    /// [`Self::advance_by`]; the errors are held, and the means move by `moves`.
+    /// The derivative along `dh` of the floors that [`Self::advance`] and, over `period`, [`Self::over_period`] give at time
+    /// `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾. `state` has been moved to that sample; `anchors` says whether it was anchored
+    /// there, at `h` itself, with the deadline held constant. `errors` and `means` are those of [`Self::advance_by`]; the
+    /// errors are held constant, and the means move by `moves`.
     ///
-    /// `None` where the condition does not know it: at the anchor of a custom profile that does not give its
+    /// `None` if the condition does not know it: at the anchor of a custom profile that does not give its
     /// [derivative](super::profile::Profile::directional), and under most custom [conditions](super::condition).
     pub fn differentiate(
         &self,
@@ -106,8 +106,8 @@ impl FixedTime {
         })
     }
 
-    /// The derivative of the bounds of a set that is kept with a rate and a margin that are chosen at the sample, where the margin
-    /// asked for moves by `margin`. Linear in all that moves.
+    /// The derivative of the bounds of a set that is kept with a rate and a margin chosen at the sample, as the requested
+    /// margin moves by `margin`. Linear in all that moves.
     fn kept_change(
         &self,
         state: &FixedTimeState,
@@ -117,7 +117,7 @@ impl FixedTime {
         margin: f64,
         period: Option<f64>,
     ) -> BoundDerivative {
-        // What the choice is made of: h … h⁽ⁿ⁻¹⁾, the margin, and the means; each with its size and its change.
+        // The numbers on which the choice depends: h … h⁽ⁿ⁻¹⁾, the margin, and the means; each with its size and its change.
         let rate = state.stay_rate;
         let power = |k: usize| elementary::powi(rate, k as i32);
         let size = h
@@ -150,7 +150,8 @@ impl FixedTime {
                 }
                 self.kept(&state, t, &at[..self.n], errors, &means, period)
             };
-            // Across the end of a phase only one side is of the piece in force; where neither is, the choice is held.
+            // Across the end of a phase only one side belongs to the piece in force; if neither does, the choice is held
+            // constant.
             let known = match [moved(-by), moved(by)] {
                 [Some(less), Some(more)] => Some((less, more, 2.0 * by)),
                 [None, Some(more)] => moved(0.0).map(|here| (here, more, by)),
@@ -164,7 +165,7 @@ impl FixedTime {
         BoundDerivative { margin, ..sum }
     }
 
-    /// The bounds at `t` and `h` of a set that is kept. `None` where that ends the phase.
+    /// The bounds at `t` and `h` of a set that is kept. `None` if that ends the phase.
     fn kept(
         &self,
         state: &FixedTimeState,

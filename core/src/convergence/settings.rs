@@ -17,8 +17,8 @@ pub enum Method {
     /// Relative degree 2 and above; for odd ones many anchors have no such rate
     /// ([`FixedTime::refusal`](super::FixedTime::refusal)).
     RepeatedRoot,
-    /// (D + a)ⁿ (h − μ − r) ≥ 0 with the [`Hermite`](super::hermite::Hermite) profile r, or one of
-    /// one's own ([`FixedTime::with_profile`](super::FixedTime::with_profile)).
+    /// (D + a)ⁿ (h − μ − r) ≥ 0 with the [`Hermite`](super::hermite::Hermite) profile r, or a custom one
+    /// ([`FixedTime::with_profile`](super::FixedTime::with_profile)).
     #[default]
     ReferenceProfile,
 }
@@ -35,8 +35,8 @@ pub enum ProfileKind {
     LowPeak,
 }
 
-/// The answer to a deadline that the input bounds certainly do not allow, at the anchor's sample or at any
-/// later one ([`reach`](crate::reach)).
+/// The answer to a deadline that the input bounds certainly do not allow, at the anchor's sample or at any later one
+/// ([`reach`](crate::reach)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
@@ -45,23 +45,24 @@ pub enum Infeasible {
     /// Report it and keep the deadline.
     #[default]
     Report,
-    /// Give up the deadline. The promise restarts from that sample, with twice the earliest time at which h ≥ 0 is
-    /// not ruled out; the factor grows by half each further time. A deadline that passes outside is given up as well.
-    /// Where no bound is known, the new one has the configured length. Counted in
+    /// Give up the deadline. The promise restarts from that sample, with twice the earliest time at which h ≥ 0 is not ruled
+    /// out; the factor grows by half each further time. A deadline that passes with the state outside is given up as well.
+    /// If no bound is known, the new one has the configured length. Counted in
     /// [`FixedTimeState::postponed`](super::FixedTimeState::postponed).
     Earliest,
 }
 
 /// Settings of one barrier's promise.
 ///
-/// In a file, keys that are left out have their defaults. The [`FilterBuilder`](crate::filter::FilterBuilder) checks all numbers, wherever they come from.
+/// In a file, keys that are left out have their defaults. The [`FilterBuilder`](crate::filter::FilterBuilder) checks all
+/// numbers, whatever their source.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default = "FixedTimeSettings::keeping", deny_unknown_fields))]
 pub struct FixedTimeSettings {
-    /// T in s from the anchor, finite, > 0. One that ends before the next sample is met at that sample for
-    /// relative degree 1, where the filter looks over the period ([`Sampling`](crate::filter::Sampling)), and later
-    /// for higher ones. `None`: the set is to be kept from a start inside it; from one outside nothing is promised.
+    /// T in s from the anchor, finite, > 0. A deadline before the next sample is met at that sample for relative degree 1,
+    /// if the filter looks over the period ([`Sampling`](crate::filter::Sampling)), and later for higher ones. `None`: the
+    /// set is to be kept from a start inside it; from a start outside nothing is promised.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub deadline: Option<f64>,
     /// The method by which the deadline is met. Default: [`Method::ReferenceProfile`].
@@ -70,31 +71,29 @@ pub struct FixedTimeSettings {
     pub profile: ProfileKind,
     /// The answer to a deadline that certainly cannot be met. Default: [`Infeasible::Report`].
     pub infeasible: Infeasible,
-    /// a in 1/s, finite, > 0: how fast an error against the profile decays. Default: [`Self::default_rate`]
-    /// of the deadline in force and the sampling period.
+    /// a in 1/s, finite, > 0: how fast an error against the profile decays. Default: [`Self::default_rate`] of the deadline
+    /// in force and the sampling period.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub rate: Option<f64>,
     /// n rates for the errors against the profile, Π (D + a_i), in place of `rate`. Default: none.
     pub rates: Option<Operator>,
-    /// a of the stay constraint in 1/s, finite, > 0; a larger one is taken where it must be
-    /// ([`stay::keep`](super::stay::keep)). Default: `rate`, else 20/T. Where inputs have bounds and n ≤ 2, it is at
-    /// most what braking with half of φ_max allows, (φ_max/2e)^{1/n}; φ_max is the largest h⁽ⁿ⁾ within the bounds.
-    /// Without a deadline it is that alone, else 2/s.
+    /// a of the stay constraint in 1/s, finite, > 0; a larger one is used if necessary ([`stay::keep`](super::stay::keep)).
+    /// Default: `rate`, else 20/T. If inputs have bounds and n ≤ 2, it is at most what braking with half of φ_max allows,
+    /// (φ_max/2e)^{1/n}; φ_max is the largest h⁽ⁿ⁾ within the bounds. Without a deadline it is that alone, else 2/s.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub stay_rate: Option<f64>,
     /// μ in the unit of h, finite, ≥ 0: arrive and stay this far inside. The expected cost of held inputs
-    /// comes on top of it ([`sampled::margin`](super::sampled::margin)) where the period is known.
+    /// ([`sampled::margin`](super::sampled::margin)) is added if the period is known.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub margin: f64,
-    /// Time in s, finite, > 0, within which a barrier that was left after an arrival is to be reached
-    /// again: leaving then anchors again with this deadline, or with what is left of the first one while that is
-    /// ahead. `None`, the default: leaving is reported ([`Phase::Left`](super::Phase::Left)) and the stay constraint
-    /// pulls back, without a deadline.
+    /// Time in s, finite, > 0, within which a barrier that was left after an arrival is to be reached again. Leaving then
+    /// anchors again with this deadline, or with the remainder of the first one while that is ahead. `None`, the default:
+    /// leaving is reported ([`Phase::Left`](super::Phase::Left)) and the stay constraint pulls back, without a deadline.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub recovery: Option<f64>,
     /// W in `[h]`/sⁿ, finite, ≥ 0: a bound on the part of h⁽ⁿ⁾ that the model lacks, such as L_wL_f^{n−1}h w for a
-    /// disturbance w. The constraint asks for as much more, so the promise holds for every disturbance within
-    /// the bound. A disturbance must enter h⁽ⁿ⁾ only, and no earlier derivative. Default: 0.
+    /// disturbance w. The constraint requires that much more, so the promise holds for every disturbance within the bound. A
+    /// disturbance must enter h⁽ⁿ⁾ only, and no earlier derivative. Default: 0.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub disturbance: f64,
 }
@@ -103,7 +102,7 @@ impl FixedTimeSettings {
     /// Rate times deadline of [`Self::default_rate`], for periods that are short against the deadline.
     pub const DEFAULT_RATE_TIMES_DEADLINE: f64 = 20.0;
 
-    /// The default of `stay_rate` in 1/s where neither a deadline nor bounds on the inputs say anything.
+    /// The default of `stay_rate` in 1/s if there is neither a deadline nor a bound on the inputs.
     pub const DEFAULT_KEEP_RATE: f64 = 2.0;
 
     /// Rate times sampling period that [`Self::default_rate`] stays below.
@@ -133,9 +132,9 @@ impl FixedTimeSettings {
     /// The default of both rates in 1/s: the smaller of 20/T and 1/(2δ), for a deadline T > 0 and a period
     /// δ ≥ 0, both in s.
     ///
-    /// An error of order n is gone after some n/a, 0.4 T for n = 8. That is early enough before the deadline, and
-    /// slow enough that inputs stay of the size the profile itself needs. A rate above 1/(2δ) asks for more than
-    /// two samples can do.
+    /// An error of order n has decayed after about n/a, 0.4 T for n = 8. That is early enough before the deadline, and slow
+    /// enough that inputs remain of the size that the profile itself needs. A rate above 1/(2δ) requires more than two
+    /// samples can do.
     pub fn default_rate(deadline: f64, period: f64) -> f64 {
         let by_deadline = Self::DEFAULT_RATE_TIMES_DEADLINE / deadline;
         if period > 0.0 { by_deadline.min(Self::DEFAULT_RATE_TIMES_PERIOD / period) } else { by_deadline }

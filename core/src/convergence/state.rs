@@ -4,7 +4,7 @@ use super::comparison::Stack;
 use super::condition::{EXACT, Sample};
 use super::phase::Phase;
 
-/// The memory of a promise between samples: plain data, all that a snapshot needs.
+/// The memory of a promise between samples: plain data, and all that a snapshot needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FixedTimeState {
@@ -16,10 +16,10 @@ pub struct FixedTimeState {
     /// Time of the anchor, t₀ in s.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub anchor_time: f64,
-    /// T in s, counted from the anchor; infinite where there is none.
+    /// T in s, counted from the anchor; infinite if there is none.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub deadline: f64,
-    /// Number of times that leaving the set has anchored again
+    /// How many times leaving the set has anchored again
     /// ([`FixedTimeSettings::recovery`](super::FixedTimeSettings::recovery)).
     pub recoveries: u32,
     /// Number of deadlines given up for a later one, because the input bounds do not allow them
@@ -28,7 +28,7 @@ pub struct FixedTimeState {
     /// (h − μ)⁽ʲ⁾ at the anchor for j < n.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub anchor: Stack,
-    /// The rate of the approach in 1/s, chosen at the anchor; not used where the settings give n of them.
+    /// The rate of the approach in 1/s, chosen at the anchor; not used if the settings give n rates.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub rate: f64,
     /// The rate of the stay constraint in 1/s, chosen at the last sample ([`stay::keep`](super::stay::keep)).
@@ -40,33 +40,33 @@ pub struct FixedTimeState {
     /// The part of the floor that leads back from `stay_margin` to `margin`, `[h]`/sⁿ, chosen there too.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub pull: f64,
-    /// The largest ‖L_gL_f^{n−1}h‖ at a sample since the anchor, and since the arrival where an approach has ended.
+    /// The largest ‖L_gL_f^{n−1}h‖ at a sample since the anchor, or since the arrival if an approach has ended.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub gain: f64,
-    /// μ in the unit of h, chosen at the anchor: the settings' margin, or `least_margin` where that is more, and the expected
-    /// cost of held inputs.
+    /// μ in the unit of h, chosen at the anchor: the margin of the settings, or `least_margin` if that is more, plus the
+    /// expected cost of held inputs.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub margin: f64,
-    /// What μ is at least, in the unit of h, ≥ 0, whatever the settings say: so that a plan finds room behind the constraint.
+    /// Least μ in the unit of h, ≥ 0, whatever the settings say: it leaves room for a plan behind the constraint.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub least_margin: f64,
-    /// The sampling period in s that was accounted for at the anchor, 0 for none.
+    /// The sampling period in s for which the anchor accounted, 0 for none.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub period: f64,
-    /// Whether the method could not be used from this anchor and another took its place
+    /// Whether the method could not be used from this anchor, so that another replaced it
     /// ([`FixedTime::refusal`](super::FixedTime::refusal) says why).
     pub fallback: bool,
     /// Time in s of the first sample with h ≥ 0 since the anchor.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub arrival: Option<f64>,
-    /// Whether the theorem behind the present phase applies from the last sample on: its conditions held there.
-    /// Whoever enforces the row clears it where that is not met, or the held input breaks the promise on the way.
+    /// Whether the theorem behind the present phase applies from the last sample on: its conditions held there. Code that
+    /// enforces the row clears it if the row is not met, or if the held input breaks the promise in between.
     pub on_course: bool,
-    /// The steps in a row that did not meet the constraint, until now.
+    /// The current run of steps that did not meet the constraint.
     pub unmet: Option<Unmet>,
 }
 
-/// Steps in a row that did not meet a constraint.
+/// A run of consecutive steps that did not meet a constraint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Unmet {
@@ -81,9 +81,10 @@ pub struct Unmet {
 }
 
 impl Unmet {
+    /// Rise of h that counts as progress, as a part of its size.
     const PROGRESS: f64 = 0.01;
 
-    /// Counts one more step, at time `t` with the value `h`.
+    /// Counts another step, at time `t` with the value `h`.
     pub(crate) fn after(before: Option<Self>, t: f64, h: f64) -> Self {
         match before {
             None => Self { steps: 1, since: t, h },
@@ -132,7 +133,7 @@ impl FixedTimeState {
         self.on_approach(0.0, &self.anchor[..n], &EXACT)
     }
 
-    /// Whether h ≥ 0 held at the anchor: a set to be kept and not to be reached.
+    /// Whether h ≥ 0 held at the anchor: a set to be kept rather than to be reached.
     pub fn was_inside(&self) -> bool {
         self.phase != Phase::Waiting && self.anchor[0] + self.margin >= 0.0
     }

@@ -8,16 +8,16 @@
 //! A_k(a) = k!\, c_k(a) = \sum_{j\le k} \binom{k}{j} a^{k-j} e^{(j)}, \qquad \frac{dA_k}{da} = k\, A_{k-1}. \tag{A}
 //! ```
 //!
-//! So the rates ≥ 0 that will do are a ray [a_min, ∞), with a_min of [`smallest_rate`]. There is none if and only if
-//! the first derivative that is not zero is negative. A rate that does at one sample does at the next: the rate may
-//! be chosen again at every sample (`docs/theory.md#rate-for-every-sample`). The least h⁽ⁿ⁾ that a rate asks for,
+//! So the rates ≥ 0 that suffice are a ray [a_min, ∞), with a_min of [`smallest_rate`]. There is none if and only if the
+//! first nonzero derivative is negative. A rate that suffices at one sample suffices at the next: the rate may be chosen
+//! again at every sample (`docs/theory.md#rate-for-every-sample`). The least h⁽ⁿ⁾ that a rate requires,
 //!
 //! ```math
 //! \varphi(a) = -\sum_{j<n} \binom{n}{j} a^{n-j} e^{(j)}, \qquad \frac{d\varphi}{da} = -n\,A_{n-1}(a) \le 0, \tag{W}
 //! ```
 //!
-//! falls with a: a larger rate brakes later and harder. [`keep`] takes the gentle one where it can. It takes a larger
-//! one where the gentle one asks for what the inputs cannot give and nothing is about to be left.
+//! falls with a: a larger rate brakes later and harder. [`keep`] uses the gentle rate if it can. It uses a larger one if the
+//! gentle rate requires more than the inputs can do and the state is not about to leave the set.
 //!
 //! With e = h − μ, all A_k(a) ≥ 0 says μ ≤ A_k(a; h)/aᵏ for all k < n. The least of them, `affordable_margin`, is the
 //! largest margin with which the condition holds.
@@ -44,11 +44,10 @@ pub fn is_invariant(rate: f64, e: &[f64]) -> bool {
     all
 }
 
-/// The smallest rate a ≥ 0 in 1/s with [`is_invariant`]; `None` if no finite rate has it. For n = 2,
-/// max(0, −ė/e).
+/// The smallest rate a ≥ 0 in 1/s with [`is_invariant`]; `None` if no finite rate has it. For n = 2, max(0, −ė/e).
 ///
-/// The rate returned satisfies [`is_invariant`] to the last bit; the number below it does not, but for
-/// round-off of the A_k.
+/// The rate returned satisfies [`is_invariant`] to the last bit; the number below it does not, except for round-off of the
+/// A_k.
 ///
 /// ```
 /// use punctual_core::convergence::stay::smallest_rate;
@@ -66,8 +65,8 @@ pub fn smallest_rate(e: &[f64]) -> Option<f64> {
     is_invariant(f64::MAX, e).then(|| first_near(guess, 0.0, f64::MAX, |rate| is_invariant(rate, e)))
 }
 
-/// The largest μ for which h − μ satisfies [`is_invariant`] with `rate` > 0; negative where none ≥ 0 does. `h` holds
-/// h⁽⁰⁾ … h⁽ⁿ⁻¹⁾.
+/// The largest μ for which h − μ satisfies [`is_invariant`] with `rate` > 0; negative if none ≥ 0 does. `h` holds h⁽⁰⁾ …
+/// h⁽ⁿ⁻¹⁾.
 #[inline]
 pub(super) fn affordable_margin(rate: f64, h: &[f64]) -> f64 {
     let (mut least, mut power) = (h[0], 1.0);
@@ -89,14 +88,15 @@ pub struct Means {
     pub drift: f64,
     /// The most that inputs within their bounds add to it, `[h]`/sⁿ; infinite without bounds.
     pub reach: f64,
-    /// ‖L_gL_f^{n−1}h‖ as a part of the largest since the anchor or the arrival, 0 ..= 1: how well h can be influenced now.
+    /// ‖L_gL_f^{n−1}h‖ as a part of its largest value since the anchor or the arrival, 0 ..= 1: how well h can be influenced
+    /// now.
     pub weight: f64,
-    /// The longest time in s for which the input may be held, 0 where it is not known.
+    /// The longest time in s for which the input may be held, 0 if it is not known.
     pub hold: f64,
 }
 
 impl Means {
-    /// Nothing known: every h⁽ⁿ⁾ can be had at once.
+    /// Nothing is known: every h⁽ⁿ⁾ is available at once.
     pub const UNKNOWN: Self = Self { drift: 0.0, reach: f64::INFINITY, weight: 1.0, hold: 0.0 };
 }
 
@@ -107,36 +107,36 @@ pub struct Keep {
     pub rate: f64,
     /// μ ≥ 0, `[h]`.
     pub margin: f64,
-    /// The part of the floor that leads back to the margin asked for, `[h]`/sⁿ, ≥ 0.
+    /// The part of the floor that leads back to the requested margin, `[h]`/sⁿ, ≥ 0.
     pub pull: f64,
     /// Whether the lemma holds with these: h ≥ μ from now on.
     pub is_invariant: bool,
 }
 
-/// Largest rate times hold: a faster error changes more within two samples than an input can do about it.
+/// Largest rate times hold: a faster error changes more within two samples than an input can counteract.
 pub const LARGEST_RATE_TIMES_HOLD: f64 = 0.5;
 
-/// The rate of least peak over the smallest rate, for n = 2. Braking from ė then takes ¾ ė²/e, with the smallest rate
-/// ė²/e; a constant ½ ė²/e would just do.
+/// The rate of least peak, in units of the smallest rate, for n = 2. Braking from ė then takes ¾ ė²/e; with the smallest
+/// rate it takes ė²/e; a constant ½ ė²/e would just suffice.
 const OVER_SMALLEST: f64 = 1.5;
 
-/// The part of the margin that is enough to keep the gentle rate.
+/// The part of the margin that suffices to keep the gentle rate.
 const ENOUGH: f64 = 0.5;
 
-/// Largest rate over the one asked for, where no period limits it.
+/// Largest rate, in units of the requested one, if no period limits it.
 const LARGEST_RATE_OVER_BASE: f64 = 10.0;
 
-/// Chooses how to keep h ≥ 0 from the derivatives `h` (h⁽⁰⁾ … h⁽ⁿ⁻¹⁾): with `margin` μ and rate `base` > 0 where they
-/// will do, with a smaller margin and a larger rate where they do not.
+/// Chooses how to keep h ≥ 0 from the derivatives `h` (h⁽⁰⁾ … h⁽ⁿ⁻¹⁾): with `margin` μ and rate `base` > 0 if they suffice,
+/// otherwise with a smaller margin and a larger rate.
 ///
-/// 1. The rate is `base` where that affords half the margin, with all that it affords.
-/// 2. Else the margin is half the one asked for, or what is affordable at the largest rate that samples can follow. The
-///    rate is the smallest that will do, for n = 2 1.5 times that.
-/// 3. The rate is raised where it asks for more than bounds allow (`means.reach`). Where h can hardly be
-///    influenced (`means.weight`) or comes back by itself, it is raised until the floor is lower by what the plant
-///    itself pulls h⁽ⁿ⁾ down. At a disc's centre the gradient vanishes and only h⁽ⁿ⁾ is negative, though nothing is
-///    about to be left.
-/// 4. Where margin is missing, `pull` asks for what the gentle rate and all of the margin would.
+/// 1. The rate is `base` if that affords half the margin; the margin is then all that it affords.
+/// 2. Otherwise the margin is half the requested one, or what is affordable at the largest rate that samples can follow. The
+///    rate is the smallest that suffices, for n = 2 1.5 times that.
+/// 3. The rate is raised if it requires more than the bounds allow (`means.reach`). If h can hardly be influenced
+///    (`means.weight`) or comes back by itself, it is raised until the floor is lower by the amount by which the plant
+///    itself pulls h⁽ⁿ⁾ down. At a disc's centre the gradient vanishes and only h⁽ⁿ⁾ is negative, though the state is not
+///    about to leave.
+/// 4. If margin is missing, `pull` requires what the gentle rate and all of the margin would.
 ///
 /// The reasons are in `docs/theory.md#rate-for-every-sample`.
 pub fn keep<const N: usize>(h: &[f64; N], margin: f64, base: f64, means: &Means) -> Keep {
@@ -152,17 +152,17 @@ pub fn keep<const N: usize>(h: &[f64; N], margin: f64, base: f64, means: &Means)
     let e = &e;
     let is_invariant = affordable >= 0.0;
     if !is_invariant {
-        // Not even the largest rate affords a margin ≥ 0: as hard as it must be, where a rate does it at all.
+        // Not even the largest rate affords a margin ≥ 0: as hard as necessary, if any rate suffices.
         let rate = smallest_rate(e).map_or(limit, |rate| rate.max(base));
         return Keep { rate, margin: kept, pull: 0.0, is_invariant };
     }
-    // 2. The smallest rate that will do, where the gentle one does not.
+    // 2. The smallest rate that suffices, if the gentle one does not.
     let over_smallest = if N == 2 { OVER_SMALLEST } else { 1.0 };
     let smallest = || smallest_rate(e).map_or(limit, |rate| over_smallest * rate);
     let gentle = if is_gentle { base } else { elementary::clamp(smallest(), base, limit) };
     let floor = |rate: f64| -lower_terms(rate, e);
     let possible = means.drift + means.reach;
-    // 3. The plant's own pull is left to later where h can hardly be influenced, or comes back by itself.
+    // 3. The plant's own pull is dealt with later if h can hardly be influenced, or comes back by itself.
     let strength = elementary::powi(means.weight, 2) * outwards(e, base);
     let eased = |wanted: f64| {
         let relieved = means.drift.min(0.0) + wanted.max(0.0);
@@ -173,7 +173,7 @@ pub fn keep<const N: usize>(h: &[f64; N], margin: f64, base: f64, means: &Means)
     let rate = if wanted <= most {
         gentle
     } else {
-        // It has to stay that low for a part of the hold: the larger a part, the less h follows an input.
+        // It has to stay that low for a part of the hold: the larger the part, the less h follows an input.
         let ahead = if most < possible { ahead(e, most, (1.0 - strength) * means.hold) } else { *e };
         let is_met = |rate: f64| floor(rate).max(-lower_terms(rate, &ahead)) <= most;
         let guess = rate_of_floor(most, e).max(rate_of_floor(most, &ahead));
@@ -186,12 +186,12 @@ pub fn keep<const N: usize>(h: &[f64; N], margin: f64, base: f64, means: &Means)
 }
 
 /// The condition of a set that is kept: (D + a)ⁿ (h − μ) ≥ pull. Rate, margin and pull are chosen again at every sample
-/// ([`keep`]) and are those of the [`Sample`] then.
+/// ([`keep`]) and are then those of the [`Sample`].
 #[derive(Clone, Copy, Debug)]
 pub struct Stay<'a>(pub &'a FixedTimeSettings);
 
 impl Stay<'_> {
-    /// Chooses how the set is kept from the derivatives `h`, which are at least `lowest`, and writes that to `state`.
+    /// Chooses how the set is kept from the derivatives `h`, which are at least `lowest`, and writes the choice to `state`.
     pub(super) fn choose<const N: usize>(
         &self,
         state: &mut FixedTimeState,
@@ -208,12 +208,12 @@ impl Stay<'_> {
             chosen = keep_from(lowest);
         }
         (state.stay_rate, state.stay_margin, state.pull) = (chosen.rate, chosen.margin, chosen.pull);
-        // Errors are bounded to first order: half of the margin has to be left for the rest.
+        // Errors are bounded to first order only, so half of the margin has to be left for the rest.
         let is_covered = || is_kept(chosen.rate) && chosen.margin >= ENOUGH * state.margin;
         state.on_course = chosen.is_invariant && (is_exact || is_covered());
     }
 
-    /// Pulls back from outside: with the gentle rate and all of the margin. Nothing is promised.
+    /// Pulls back from outside, with the gentle rate and all of the margin. Nothing is promised.
     pub(super) fn pull_back<const N: usize>(
         &self,
         state: &mut FixedTimeState,
@@ -241,9 +241,9 @@ impl Stay<'_> {
         state.stay_margin == state.margin && rate == Some(state.stay_rate)
     }
 
-    /// The rate in 1/s with which the set is kept where nothing asks for a larger one.
+    /// The rate in 1/s with which the set is kept if nothing requires a larger one.
     fn base_rate<const N: usize>(&self, h: &[f64; N], means: &Means) -> f64 {
-        /// The part of the largest h⁽ⁿ⁾ within the bounds that is used where there is time.
+        /// The part of the largest h⁽ⁿ⁾ within the bounds that is used if there is time.
         const COMFORTABLE: f64 = 0.5;
         let settings = self.0;
         if let Some(rate) = settings.stay_rate.or(settings.rate) {
@@ -285,7 +285,7 @@ impl Condition for Stay<'_> {
     }
 }
 
-/// The part of e that is being lost, for n = 2: 0 where ė ≥ a e, 1 where ė ≤ 0. For other n it is 1.
+/// The part of e that is being lost, for n = 2: 0 if ė ≥ a e, 1 if ė ≤ 0. For other n it is 1.
 #[inline]
 fn outwards(e: &[f64], rate: f64) -> f64 {
     let back = if e.len() == 2 { e[1] / (rate * e[0]) } else { 0.0 };
@@ -293,8 +293,8 @@ fn outwards(e: &[f64], rate: f64) -> f64 {
     if back > 0.0 { (1.0 - back).max(0.0) } else { 1.0 }
 }
 
-/// The rate from which φ ≤ `floor`, but for round-off: for n = 2 the larger zero of e a² + 2ė a + floor. Not a number where
-/// there is none, and for n > 2.
+/// The rate from which φ ≤ `floor`, up to round-off: for n = 2 the larger zero of e a² + 2ė a + floor. NaN if there is none,
+/// and for n > 2.
 fn rate_of_floor(floor: f64, e: &[f64]) -> f64 {
     match *e {
         [e] => -floor / e,

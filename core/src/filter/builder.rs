@@ -50,13 +50,13 @@ impl FilterBuilder {
         }
     }
 
-    /// Adds a barrier along `plant`; `name` is for messages and reports. Its relative degree is found
-    /// on built-in sample states ([`lie::detected`]).
+    /// Adds a barrier along `plant`; `name` is for messages and reports. Its relative degree is detected on built-in sample
+    /// states ([`lie::detected`]).
     ///
     /// # Errors
     ///
-    /// A relative degree that does not exist or is not uniform ([`Error::relative_degree`] has the
-    /// finding); a plant whose dimensions are not the filter's; settings outside their ranges.
+    /// A relative degree that does not exist or is not uniform (details in [`Error::relative_degree`]); a plant whose
+    /// dimensions are not the filter's; settings outside their ranges.
     ///
     /// ```
     /// # use punctual_core::{barriers::DistanceDisc, filter::*};
@@ -91,15 +91,15 @@ impl FilterBuilder {
         self.source(name, lie::along(plant, barrier, n)?, settings)
     }
 
-    /// Adds a barrier of the declared relative degree `n`, which is compared with the one found at the
-    /// states `samples` at t = 0: for a plant or barrier whose domain the built-in samples miss.
+    /// Adds a barrier of the declared relative degree `n`. It is compared with the one found at the states `samples` at t =
+    /// 0: for a plant or barrier whose domain the built-in samples miss.
     ///
-    /// To use a barrier against that finding, make its source with [`lie::along`] and add it with
-    /// [`Self::source`], which checks at run time only.
+    /// To use a barrier against that finding, make its source with [`lie::along`] and add it with [`Self::source`], which
+    /// checks at run time only.
     ///
     /// # Errors
     ///
-    /// As for [`Self::barrier`]; a relative degree found that is not `n`.
+    /// As for [`Self::barrier`]; the relative degree found is not `n`.
     pub fn barrier_of_degree<P, B, const NX: usize, const NU: usize>(
         self,
         name: &str,
@@ -117,8 +117,7 @@ impl FilterBuilder {
         self.source(name, lie::along(plant, barrier, n)?, settings)
     }
 
-    /// Adds a barrier of any relative degree, from whatever supplies its derivatives (such as
-    /// [`lie::along`]).
+    /// Adds a barrier of any relative degree, from any source of its derivatives (such as [`lie::along`]).
     ///
     /// # Errors
     ///
@@ -164,12 +163,12 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// Puts a custom constraint in the place of the last barrier's method
-    /// ([`FixedTime::with_condition`]), such as one of the crate `punctual-reference`.
+    /// Replaces the last barrier's method by a custom constraint ([`FixedTime::with_condition`]), such as one of the crate
+    /// `punctual-reference`.
     ///
     /// # Errors
     ///
-    /// No barrier yet; settings that the constraint would take the place of.
+    /// No barrier yet; settings that the constraint would override.
     ///
     /// ```
     /// # use punctual_core::{barriers::DistanceDisc, filter::*};
@@ -209,8 +208,8 @@ impl FilterBuilder {
     ///
     /// # Errors
     ///
-    /// No barrier yet; a time out of range; an end before the deadline, which would promise nothing; a barrier to wait for that
-    /// was not added before.
+    /// No barrier yet; a time out of range; an end before the deadline, which would promise nothing; waiting for a barrier
+    /// that was not added before.
     pub fn window(mut self, begin: Begin, end: End) -> Result<Self, Error> {
         let Some(index) = self.slots.len().checked_sub(1) else {
             return Err(Error::new(ErrorKind::Dimension, "window", "there is no barrier yet to have one"));
@@ -238,7 +237,7 @@ impl FilterBuilder {
         {
             return range("end", format!("is {seconds}, must be > begin = {opens}"));
         }
-        // After another's arrival the deadline counts from there.
+        // After the arrival of another barrier, the deadline counts from there.
         let deadline = slot.promise.deadline();
         if let (Begin::AtOnce | Begin::At(_), End::At(seconds)) = (begin, end)
             && deadline.is_finite()
@@ -253,7 +252,7 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// Sets how the last barrier added is treated where not all can be met. Default: [`Strictness::KeepFirst`].
+    /// Sets how the last barrier added is treated if not all can be met. Default: [`Strictness::KeepFirst`].
     ///
     /// # Errors
     ///
@@ -273,13 +272,12 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// Bounds the input: `min[i]` ≤ u_i ≤ `max[i]`, in units of u; ±infinity where there is none.
-    /// Default: none.
+    /// Bounds the input: `min[i]` ≤ u_i ≤ `max[i]`, in units of u; ±infinity for no bound. Default: none.
     ///
     /// # Errors
     ///
-    /// A slice of the wrong length, NaN, a lower bound above its upper bound, a lower bound
-    /// of +infinity or an upper bound of −infinity.
+    /// A slice of the wrong length, NaN, a lower bound above its upper bound, a lower bound of +infinity or an upper bound
+    /// of −infinity.
     pub fn bounds(mut self, min: &[f64], max: &[f64]) -> Result<Self, Error> {
         length("u_min", min.len(), self.input_dim)?;
         length("u_max", max.len(), self.input_dim)?;
@@ -314,7 +312,7 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// Chooses the account taken of inputs that are held between samples. Default: [`Sampling::Measured`].
+    /// Chooses how to account for inputs that are held between samples. Default: [`Sampling::Measured`].
     ///
     /// # Errors
     ///
@@ -324,9 +322,9 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// Sets the longest time in s that may pass between two samples, finite, > 0: promises then hold for steps of any
-    /// length up to it. A longer one suspends them until the next sample shows that they can be given again.
-    /// Default: the period that [`Sampling`] assumes.
+    /// Sets the longest time in s that may pass between two samples, finite, > 0. Promises then hold for steps of any length
+    /// up to it. A longer step suspends them until the next sample shows that they can be given again. Default: the period
+    /// that [`Sampling`] assumes.
     ///
     /// # Errors
     ///
@@ -336,11 +334,11 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// Sets the time in s, finite, ≥ 0, from the filter's first sample until it is armed: every deadline counts from the first
-    /// sample with valid inputs then. Default: 0, the first sample itself. For a loop that hands out zeros, or what settles,
-    /// before it is under way.
+    /// Sets the time in s, finite, ≥ 0, from the filter's first sample until it is armed: every deadline counts from the
+    /// first sample with valid inputs after that. Default: 0, the first sample itself. For a loop that passes zeros, or has
+    /// to settle, before it is under way.
     ///
-    /// Before, nothing is asked and nothing is promised: the input is u_ref within its bounds, the status
+    /// Until then nothing is asked and nothing is promised: the input is u_ref within its bounds, the status
     /// [`NotArmed`](super::Status::NotArmed). From then on every bit is that of a filter whose first sample came then.
     /// [`Filter::rearm`] does not make it wait again.
     ///
@@ -352,13 +350,13 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// Sets the time in s, finite, ≥ 0, from a sample until its input acts: one communication step under a
-    /// master that exchanges all values first (Jacobi). Default: 0.
+    /// Sets the time in s, finite, ≥ 0, from a sample until its input acts: one communication step under a master that first
+    /// exchanges all values (Jacobi). Default: 0.
     ///
-    /// The input of the step before is taken to act until then; before the first, 0 or the nearest admissible
-    /// input. So the delay must not exceed the sampling period. The constraint is enforced from the predicted
-    /// state at t + delay on. Every barrier report but its [`h`](super::BarrierReport::h) is of that time.
-    /// Deadlines count from the first sample itself.
+    /// Until then the input of the previous step is assumed to act; before the first, 0 or the nearest admissible input. So
+    /// the delay must not exceed the sampling period. The constraint is enforced from the predicted state at t + delay on.
+    /// In every barrier report all values but [`h`](super::BarrierReport::h) refer to that time. Deadlines count from the
+    /// first sample itself.
     ///
     /// # Errors
     ///
@@ -371,10 +369,9 @@ impl FilterBuilder {
     /// Bounds the errors of the measured state: |x̂_i − x_i| ≤ `errors[i]` at every sample, finite, ≥ 0, in the unit
     /// of x_i. The promises then hold for the true state, to first order in the errors. Default: none.
     ///
-    /// Needs a prediction over the period, and a method that allows for errors: the reference profile, or a custom
-    /// condition that says so. `deadline_unreachable` then stays false until the
-    /// deadline has passed, and there are no directional derivatives. A step takes some four times the work per
-    /// measured state.
+    /// Needs a prediction over the period, and a method that allows for errors: the reference profile, or a custom condition
+    /// that says so. `deadline_unreachable` then stays false until the deadline has passed, and there are no directional
+    /// derivatives. A step takes about four times the work per measured state.
     ///
     /// # Errors
     ///
@@ -388,14 +385,14 @@ impl FilterBuilder {
         Ok(self)
     }
 
-    /// Makes the filter, not yet anchored.
+    /// Builds the filter, not yet anchored.
     ///
     /// # Errors
     ///
-    /// No barrier, or more than [`MAX_ROWS`]; no state or input, or more than [`MAX_INPUTS`] inputs. An actuation
-    /// delay that exceeds a given sampling period, or that a source cannot predict over. Measurement errors with a
-    /// delay, without a prediction over the period, with a method that does not allow for them, or with a source
-    /// that gives no derivatives along a direction.
+    /// No barrier, or more than [`MAX_ROWS`]; no state or input, or more than [`MAX_INPUTS`] inputs. An actuation delay that
+    /// exceeds a given sampling period, or over which a source cannot predict. Measurement errors with a delay, without a
+    /// prediction over the period, with a method that does not allow for them, or with a source that gives no derivatives
+    /// along a direction.
     pub fn build(self) -> Result<Filter, Error> {
         let Self {
             state_dim,
@@ -426,7 +423,7 @@ impl FilterBuilder {
         if input_dim == 0 || input_dim > MAX_INPUTS {
             return dimension("u", format!("has {input_dim} components, must have 1 to {MAX_INPUTS}"));
         }
-        // The delay: within the period, and every source can predict over it.
+        // The delay has to be within the period, and every source has to predict over it.
         if let Sampling::Period(period) = sampling
             && delay > period
         {

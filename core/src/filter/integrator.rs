@@ -7,13 +7,14 @@ use crate::error::{Error, ErrorKind, length, positive};
 use crate::lie::Direction;
 use crate::qp::Bounds;
 
-/// An integrator between the filter and its plant. The filter's barriers are along a model whose state [`Self::state`] has the
-/// input [`Self::input`] for its derivative, such as `SmallSlipBicycleWithRate` or `KinematicBicycle` of the reference plants. The
-/// plant takes that state as its input. So x lacks it, and u and u_ref have it in the place of its rate.
+/// An integrator between the filter and its plant. The filter's barriers are along a model in which the input
+/// [`Self::input`] is the derivative of the state [`Self::state`], such as `SmallSlipBicycleWithRate` or `KinematicBicycle`
+/// of the reference plants. The plant takes that state as its input. So x lacks it, and u and u_ref contain it in place of
+/// its rate.
 ///
-/// Over each period the filter's model has it change evenly. The plant is given its mean over the period, to be held;
-/// the two differ by O(δ²) in the state at the end. The wish v for it becomes the rate `gain` (v − value), or the rate
-/// that leads there within the period where that is less.
+/// Over each period it changes linearly in the filter's model. The plant receives its mean over the period, to be held; the
+/// two differ by O(δ²) in the state at the end. The requested value v becomes the rate `gain` (v − value), or the rate that
+/// leads there within the period if that is less.
 ///
 /// ```
 /// # use punctual_core::{barriers::DistanceDisc, filter::*};
@@ -40,23 +41,23 @@ pub struct Integration {
     pub state: usize,
     /// The number of the input that is its derivative, counted from 0.
     pub input: usize,
-    /// Least and largest value of the state, in its unit; ±infinity where there is none. The value begins with the number
-    /// nearest 0 within them.
+    /// Least and largest value of the state, in its unit; ±infinity if there is none. The value starts at the number nearest
+    /// 0 within them.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub limits: [f64; 2],
-    /// How fast the value follows the wish for it, 1/s, finite, > 0.
+    /// How fast the value follows the requested one, 1/s, finite, > 0.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub gain: f64,
 }
 
-/// An [`Integration`] beside the rows that it goes with. Its value is in their state.
+/// An [`Integration`] together with what the rows need for it. Its value is kept in the state of the rows.
 pub(super) struct Integrator {
     pub(super) of: Integration,
-    /// The bounds on the rate; those of a sample are tighter.
+    /// The bounds on the rate; those at a sample are tighter.
     pub(super) rates: [f64; 2],
-    /// Scratch: the model's state and its direction.
+    /// Scratch: the state of the model and its direction.
     pub(super) x: [Vec<f64>; 2],
-    /// Scratch: the model's u_ref and its direction.
+    /// Scratch: u_ref of the model and its direction.
     pub(super) u_ref: [Vec<f64>; 2],
 }
 
@@ -101,7 +102,7 @@ impl Integrator {
         value.max(self.of.limits[0]).min(self.of.limits[1])
     }
 
-    /// Completes the state and the wish of the model, and the bounds of `rows`, for a sample whose input is held for `hold` s.
+    /// Completes the state and u_ref of the model, and the bounds of `rows`, for a sample whose input is held for `hold` s.
     ///
     /// # Errors
     ///
@@ -146,12 +147,12 @@ impl Integrator {
         Ok(())
     }
 
-    /// The rate for `hold` s of each unit between the value and the wish for it, in 1/s.
+    /// The rate, held for `hold` s, per unit of difference between the requested value and the present one, in 1/s.
     fn follows(&self, hold: f64) -> f64 {
         self.of.gain.min(1.0 / hold)
     }
 
-    /// The rate for `hold` s if nothing but the bounds were in the way of the `wish` for the value.
+    /// The rate for `hold` s that the requested value `wish` asks for, limited only by the bounds.
     #[cfg(feature = "plan")]
     pub(super) fn wanted(&self, value: f64, hold: f64, wish: f64) -> f64 {
         let ends = self.of.limits.map(|limit| (limit - value) / hold);
@@ -159,14 +160,14 @@ impl Integrator {
         rate.max(self.rates[0].max(ends[0])).min(self.rates[1].min(ends[1]))
     }
 
-    /// How that rate moves with the `wish`, in 1/s: not at all beyond the bounds.
+    /// How that rate moves with `wish`, in 1/s: not at all beyond the bounds.
     #[cfg(feature = "plan")]
     pub(super) fn moves(&self, value: f64, hold: f64, wish: f64) -> f64 {
         let follows = self.follows(hold);
         if self.wanted(value, hold, wish) == (wish - value) * follows { follows } else { 0.0 }
     }
 
-    /// Puts the mean over `hold` s in the place of the rate; returns the value then.
+    /// Replaces the rate by the mean over `hold` s; returns the value at the end.
     pub(super) fn finish(&self, value: f64, hold: f64, u: &mut [f64]) -> f64 {
         let rate = u[self.of.input];
         u[self.of.input] = self.limited(value + rate * hold / 2.0);
@@ -174,7 +175,7 @@ impl Integrator {
     }
 }
 
-/// `to` = `from` with `value` put in at `place`.
+/// `to` = `from` with `value` inserted at `place`.
 pub(super) fn insert(to: &mut [f64], from: &[f64], place: usize, value: f64) {
     to[..place].copy_from_slice(&from[..place]);
     to[place] = value;

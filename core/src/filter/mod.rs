@@ -1,12 +1,12 @@
 //! The safety filter: from time, state and reference input to a safe input and a report.
 //!
-//! A [`Filter`] has rows, one per barrier, and where they are wanted an integrator before one of its inputs and backup plans:
+//! A [`Filter`] has rows, one per barrier. On request it also has an integrator before one of its inputs, and backup plans:
 //!
 //! | module | owns |
 //! |---|---|
 //! | `rows` | the constraints of a sample, the QP under them, its derivative |
-//! | `integrator` | an input that is commanded as the integral of the filter's own |
-//! | `backup` | the plan behind every input, and what is promised of it |
+//! | `integrator` | an input that is commanded as the integral of one of the filter's own inputs |
+//! | `backup` | the plan behind every input, and the guarantee that rests on it |
 //! | `state` | all that is remembered between samples: plain data; everything else can be rebuilt without changing a bit |
 
 #[cfg(feature = "plan")]
@@ -43,21 +43,21 @@ use backup::Backup;
 use integrator::Integrator;
 use rows::{BarrierSlot, Rows, SharedPlants};
 
-/// Round-off of a time that is a sum of steps, as a part of it.
+/// Round-off of a time that is a sum of steps, as a part of that time.
 const SAME_TIME: f64 = 1e-12;
 
-/// Periods that differ by less than this part of them count as equal.
+/// Two periods count as equal if they differ by less than this part of their size.
 const SAME_PERIOD: f64 = 1e-6;
 
-/// A filter on the input, made of barriers with deadlines: `min ½‖u − u_ref‖²` under one row per barrier
-/// and the input bounds, and [with plans](Self::with_plans) a verified backup plan behind every input.
+/// A filter on the input, made of barriers with deadlines. It solves `min ½‖u − u_ref‖²` under one row per barrier and the
+/// input bounds. [With plans](Self::with_plans) every input has a verified backup plan behind it.
 ///
 /// # Requirements
 ///
-/// The plant is control-affine and every barrier has the relative degree it was declared with;
-/// inputs are held between samples ([`Sampling`]). By the rows alone a barrier's guarantee
-/// needs every step satisfied ([`Status::is_satisfied`]); [`BarrierReport::on_course`] says whether
-/// its theorem's conditions have held so far. With plans it is [`BarrierReport::guaranteed`].
+/// The plant is control-affine, and every barrier has the relative degree that it was declared with. Inputs are held between
+/// samples ([`Sampling`]). By the rows alone, a barrier's guarantee needs every step satisfied ([`Status::is_satisfied`]);
+/// [`BarrierReport::on_course`] says whether the conditions of its theorem have held so far. With plans the guarantee is
+/// [`BarrierReport::guaranteed`].
 ///
 /// # References
 ///
@@ -67,7 +67,7 @@ pub struct Filter {
     integrator: Option<Integrator>,
     #[cfg(feature = "plan")]
     backup: Option<Box<Backup>>,
-    /// The time in s for which an integrated input, or one with plans, is going to be held, where it is known.
+    /// The time in s for which the next input will be held, if known. Used with an integrator or with plans.
     expected: Option<f64>,
 }
 
@@ -77,12 +77,12 @@ impl Filter {
         FilterBuilder::new(state_dim, input_dim)
     }
 
-    /// Puts an integrator between the filter and its plant. Plans come after it.
+    /// Puts an integrator between the filter and its plant. Call it before adding plans.
     ///
     /// # Errors
     ///
-    /// A state or an input that there is not; limits that are not min ≤ max; bounds of the rate that exclude 0; a delayed
-    /// filter; a gain out of range; a filter that has an integrator or plans already.
+    /// The index of a state or an input that does not exist; limits that are not min ≤ max; bounds of the rate that exclude
+    /// 0; a delayed filter; a gain out of range; a filter that already has an integrator or plans.
     pub fn with_integrator(mut self, of: Integration) -> Result<Self, Error> {
         #[cfg(feature = "plan")]
         if self.backup.is_some() {
@@ -102,21 +102,20 @@ impl Filter {
         Ok(self)
     }
 
-    /// Computes the safe input at time `t` and remembers the sample. The first call with valid inputs
-    /// anchors every barrier: its deadline counts from that `t`.
+    /// Computes the safe input at time `t` and remembers the sample. The first call with valid inputs anchors every barrier:
+    /// its deadline counts from that `t`.
     ///
     /// - `t`: time in s; later calls pass later times (an earlier one counts as the anchor's).
     /// - `x`: the state, in the plant's order and units.
-    /// - `u_ref`: the input wanted by whoever is in control.
-    /// - `u`: receives the safe input: always finite and within the bounds.
+    /// - `u_ref`: the input that the controller in charge asks for.
+    /// - `u`: receives the safe input, which is always finite and within the bounds.
     ///
-    /// Does not allocate, except for plans. Numerical outcomes (infeasible, no control authority, NaN
-    /// inputs) are the report's [`Status`], never an error.
+    /// Does not allocate, except for plans. Numerical outcomes (infeasible, no control authority, NaN inputs) are reported
+    /// as [`Status`], never as an error.
     ///
     /// # Errors
     ///
-    /// A slice of the wrong length; an integrated input of which it is not known how long it is held
-    /// ([`Self::expect_hold`]).
+    /// A slice of the wrong length; an integrated input whose hold is not known ([`Self::expect_hold`]).
     ///
     /// ```
     /// # use punctual_core::{barriers::DistanceDisc, filter::*};
@@ -141,7 +140,8 @@ impl Filter {
         Ok(&workspace.report)
     }
 
-    /// Computes what [`Self::step`] would, without remembering the sample. With plans the same step after it costs nothing.
+    /// Computes what [`Self::step`] would, without remembering the sample. With plans, the same step afterwards costs
+    /// nothing.
     ///
     /// # Errors
     ///
@@ -151,8 +151,8 @@ impl Filter {
         Ok(&self.rows.workspace.report)
     }
 
-    /// Takes a sample, in the order rows, plan, integrator: writes its input to `u`, and its report and the state after it to the
-    /// workspace.
+    /// Takes a sample, in the order rows, plan, integrator. Writes its input to `u`, and its report and the state after it
+    /// to the workspace.
     fn sample(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<(), Error> {
         let hold = self.hold(t)?;
         let Self { rows, integrator, .. } = self;
@@ -166,7 +166,7 @@ impl Filter {
             }
             rows.is_backed = backup.is_behind(&rows.state.plan, t, hold, integrator.is_some());
         }
-        // The rows, on the model's state.
+        // The rows, on the state of the model.
         match integrator {
             None => rows.sample(t, x, u_ref, u)?,
             Some(own) => {
@@ -174,12 +174,12 @@ impl Filter {
                 rows.sample(t, &own.x[0], &own.u_ref[0], u)?;
             }
         }
-        // The plan behind their answer, or in its place.
+        // The plan behind their answer, or the input that replaces it.
         #[cfg(feature = "plan")]
         if let Some(backup) = &mut self.backup {
             backup.sample((rows, integrator.as_ref()), t, hold, x, u_ref, u);
         }
-        // The mean of the integral in the place of the rate.
+        // The mean of the integral replaces the rate.
         #[cfg(feature = "plan")]
         let inside = core::array::from_fn(|i| u.get(i).copied().unwrap_or(0.0));
         if let Some(own) = integrator {
@@ -201,11 +201,11 @@ impl Filter {
         self.integrator.is_some()
     }
 
-    /// Sets the time in s, finite, > 0, for which the input of the next sample will be held; `None` where it is not known. It is for
-    /// callers that know it, such as a co-simulation slave from its step size, and it is not part of [`Self::state`].
+    /// Sets the time in s, finite, > 0, for which the input of the next sample will be held; `None` if it is not known. It
+    /// is for callers that know it, such as a co-simulation slave from its step size. It is not part of [`Self::state`].
     ///
-    /// Plans count with it, else with their own period; an integrator too, else with the sampling period. Without either, rows under
-    /// [`Sampling::Measured`] are over it at every sample.
+    /// Plans use it, or else their own period. An integrator uses it too, or else the sampling period. A filter with
+    /// neither, under [`Sampling::Measured`], enforces its rows over this time at every sample.
     ///
     /// # Errors
     ///
@@ -216,7 +216,7 @@ impl Filter {
         Ok(())
     }
 
-    /// The time in s for which the input at `t` is going to be held, where an integrator or plans count with it; else 0.
+    /// The time in s for which the input at `t` will be held, where an integrator or plans use it; otherwise 0.
     fn hold(&self, t: f64) -> Result<f64, Error> {
         #[cfg(feature = "plan")]
         if let Some(backup) = &self.backup {
@@ -236,37 +236,41 @@ impl Filter {
         }
     }
 
-    /// Computes the derivative of what [`Self::peek`] returns where x and u_ref move along `direction`. Remembers
-    /// nothing; the report is that of the sample.
+    /// Computes the derivative of what [`Self::peek`] returns as x and u_ref move along `direction`. Remembers nothing; the
+    /// report is that of the sample.
     ///
-    /// Exact for the piece in force. The input is a piecewise smooth function. Where rows, bounds, a phase or the
-    /// better of two searches change, it has a kink or a jump; the derivative is that of the piece on which the
-    /// sample was computed. A later deadline that was found at this sample ([`Infeasible::Earliest`](Infeasible::Earliest))
-    /// is held. Where more rows are active than inputs can follow, the first ones count.
+    /// The derivative is exact for the piece in force. The input is a piecewise smooth function: where the active rows, the
+    /// active bounds, a phase or the better of two searches change, it has a kink or a jump. The derivative is that of the
+    /// piece on which the sample was computed. A later deadline that was found at this sample
+    /// ([`Infeasible::Earliest`](Infeasible::Earliest)) is held constant. If more rows are active than the inputs can
+    /// follow, the first ones count.
     ///
-    /// The change of the rate and margin chosen for a set that is kept ([`stay::keep`](crate::convergence::stay::keep)) is a
-    /// quotient of differences, to some 1e-8. So are, to some 1e-4, all but h where the input comes of more than the rows: with [measurement errors](FilterBuilder::measurement_errors), where an instant between two samples
-    /// counts, and where the search over the period ended beside the nearest input. Next to a kink they are those of the rows
-    /// linearised at the answer, with errors and instants held.
+    /// Two parts are difference quotients. The change of the rate and of the margin chosen for a set that is kept
+    /// ([`stay::keep`](crate::convergence::stay::keep)) is accurate to about 1e-8. All derivatives but that of h are
+    /// accurate to about 1e-4 where the input depends on more than the rows: with [measurement
+    /// errors](FilterBuilder::measurement_errors), where an instant between two samples counts, and where the search over
+    /// the period did not end at the nearest input. Next to a kink they are those of the rows linearised at the answer, with
+    /// errors and instants held constant.
     ///
-    /// With plans the piece is u_ref, the answer of the rows, the plan's own input or a compromise of these. The plan's own input is
-    /// held: it was fixed at an earlier sample. Where the plan is new, or its input comes of feedback, that is the derivative as if it
-    /// had been there. The value of an integrated input after the step moves by twice as much as its mean.
+    /// With plans, the piece is u_ref, the answer of the rows, the plan's own input, or a compromise between these. The
+    /// plan's own input is held constant, since it was fixed at an earlier sample. If the plan is new, or its input comes
+    /// from feedback, the derivative is the one that it would have as an existing plan. The value of an integrated input
+    /// after the step moves by twice as much as its mean.
     ///
     /// By status:
     ///
-    /// - [`Unchanged`](Status::Unchanged), [`SolverFailed`](Status::SolverFailed): the direction of u_ref, 0
-    ///   in components that a bound holds.
-    /// - [`Filtered`](Status::Filtered), [`Infeasible`](Status::Infeasible) and
-    ///   [`NoAuthority`](Status::NoAuthority): (8) with the active rows, those that hold back a row that cannot be
-    ///   met among them; rows given up or left out take no part. A single row that cannot be met: 0 in the
-    ///   components at their bounds, the direction of u_ref in the others.
+    /// - [`Unchanged`](Status::Unchanged), [`SolverFailed`](Status::SolverFailed): the direction of u_ref, 0 in components
+    ///   held by a bound.
+    /// - [`Filtered`](Status::Filtered), [`Infeasible`](Status::Infeasible) and [`NoAuthority`](Status::NoAuthority): (8)
+    ///   with the active rows, including those that hold back a row that cannot be met. Rows that were given up or left out
+    ///   take no part. For a single row that cannot be met: 0 in the components at their bounds, the direction of u_ref in
+    ///   the others.
     /// - [`InvalidInput`](Status::InvalidInput), [`Singular`](Status::Singular) and
     ///   [`WrongRelativeDegree`](Status::WrongRelativeDegree), where the input is a constant: all zero.
-    /// - [`NotArmed`](Status::NotArmed): the direction of u_ref, 0 in components that a bound holds; h as ever.
+    /// - [`NotArmed`](Status::NotArmed): the direction of u_ref, 0 in components held by a bound; h as always.
     ///
-    /// Does not allocate where `out` has been used with this filter before. An answer that is not `None` says why the
-    /// derivative is not known; `out` then means nothing.
+    /// Does not allocate if `out` has been used with this filter before. A return value other than `None` says why the
+    /// derivative is not known; `out` is then meaningless.
     ///
     /// # Errors
     ///
@@ -333,12 +337,13 @@ impl Filter {
         Ok(unknown)
     }
 
-    /// Forgets the anchors: the next sample with valid inputs starts every deadline again. An integrated input stays. The time until the
-    /// filter is [armed](FilterBuilder::arm_after) counts from its first sample all the same.
+    /// Forgets the anchors: the next sample with valid inputs starts every deadline again. An integrated input keeps its
+    /// value. The time until the filter is [armed](FilterBuilder::arm_after) still counts from its first sample.
     ///
-    /// With plans the next valid sample decides what is promised. If it finds no other plan, the current one is followed as
-    /// long as it keeps what is promised then; and where x is not finite, it is followed until there is a valid sample. A
-    /// set that x is inside of then is to be kept from there on, also one that was to be left once more before its deadline.
+    /// With plans, the next valid sample decides what is promised. If it finds no other plan, the current one is followed as
+    /// long as it keeps what is promised then. While x is not finite, the current plan is followed until there is a valid
+    /// sample. If that sample is inside a set, the set has to be kept from there on, even one that was meant to be left once
+    /// more before its deadline.
     pub fn rearm(&mut self) {
         let state = &mut self.rows.state;
         state.barriers.fill(FixedTimeState::default());
@@ -356,9 +361,9 @@ impl Filter {
         &self.rows.state
     }
 
-    /// Restores a state that [`Self::state`] returned: the filter goes on exactly as it would have then. Rows take the numbers of a
-    /// state from elsewhere as they are: wrong ones break promises, but the input stays finite and within its bounds. Plans are
-    /// checked.
+    /// Restores a state that [`Self::state`] returned: the filter continues exactly as it would have then. Rows accept the
+    /// numbers of a state from elsewhere as they are: wrong numbers break promises, but the input stays finite and within
+    /// its bounds. Plans are checked.
     ///
     /// # Errors
     ///
@@ -375,7 +380,7 @@ impl Filter {
         #[cfg(feature = "plan")]
         match &mut self.backup {
             Some(backup) => backup.restart(&self.rows.state.plan),
-            // Rows alone follow none.
+            // Rows alone follow no plan.
             None => self.rows.state.plan = PlanState::default(),
         }
         Ok(())
@@ -401,7 +406,8 @@ impl Filter {
         self.rows.workspace.next.integrated
     }
 
-    /// Sets the [integrated input](Self::integrated), to the nearest within its limits. Nothing where none is integrated.
+    /// Sets the [integrated input](Self::integrated) to the nearest value within its limits. Does nothing if none is
+    /// integrated.
     pub fn set_integrated(&mut self, value: f64) {
         let Some(own) = &self.integrator else { return };
         self.rows.state.integrated = own.limited(value);
@@ -411,9 +417,9 @@ impl Filter {
         }
     }
 
-    /// Gives barrier number `index` a new deadline in s, finite, > 0, that counts from the next sample. Its promise
-    /// starts again there, from the derivatives that h then has. Until then the input of the last sample keeps the old
-    /// promise, and the new profile starts with a zero error: no guarantee has a gap.
+    /// Gives barrier number `index` a new deadline in s, finite, > 0, counted from the next sample. Its promise starts again
+    /// there, from the derivatives that h then has. Until then the input of the last sample keeps the old promise, and the
+    /// new profile starts with a zero error: the guarantee has no gap.
     ///
     /// # Errors
     ///
@@ -427,9 +433,9 @@ impl Filter {
         Ok(())
     }
 
-    /// Replaces the set of barrier number `index`, such as a goal that was moved: its promise starts again
-    /// at the next sample, as with [`Self::set_deadline`]. The source is along the model, with the integral of an
-    /// integrated input.
+    /// Replaces the set of barrier number `index`, for example when a goal was moved. Its promise starts again at the next
+    /// sample, as with [`Self::set_deadline`]. The source is along the model, which includes the integral of an integrated
+    /// input.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! Questions to a filter between its samples; it remembers none of them.
+//! Queries to a filter between its samples. It remembers none of them.
 
 use super::rows::Workspace;
 use super::{Filter, Refusal};
@@ -8,9 +8,9 @@ use crate::qp::{Problem, Residuals};
 use crate::{MAX_INPUTS, reach};
 
 impl Filter {
-    /// A time in s before which no input within the bounds brings barrier number `index` to h ≥ 0 from the
-    /// state `x` at `t` ([`reach::earliest_arrival`]), at most `horizon` (s, finite, > 0); `None` where that is not
-    /// known (with a disturbance too) or there is no such barrier.
+    /// A time in s before which no input within the bounds brings barrier number `index` to h ≥ 0 from the state `x` at `t`
+    /// ([`reach::earliest_arrival`]), at most `horizon` (s, finite, > 0). `None` if that is not known (also with a
+    /// disturbance) or if there is no such barrier.
     ///
     /// # Errors
     ///
@@ -28,8 +28,8 @@ impl Filter {
         Ok(slot.and_then(|c| reach::earliest_arrival(&*c.source, (t, x), &self.rows.bounds, horizon)))
     }
 
-    /// Whether the input bounds certainly do not allow h ≥ 0 of barrier number `index` at `after` s, finite, ≥ 0,
-    /// after `t` and the state `x`.
+    /// Whether it is certain that the input bounds do not allow h ≥ 0 of barrier number `index` at `after` s, finite, ≥ 0,
+    /// after `t`, from the state `x`.
     ///
     /// # Errors
     ///
@@ -40,8 +40,8 @@ impl Filter {
         Ok(self.rows.is_ruled_out(index, (t, x), after))
     }
 
-    /// h of each barrier at time `t` (s) and the state `x`, written to `h` in the order of the report: for instants
-    /// between two samples. Remembers nothing.
+    /// h of each barrier at time `t` (s) and state `x`, written to `h` in the order of the report: for instants between two
+    /// samples. Remembers nothing.
     ///
     /// # Errors
     ///
@@ -57,10 +57,10 @@ impl Filter {
         Ok(())
     }
 
-    /// The residuals of `u`, the answer of the last [`Self::step`] or [`Self::peek`] to `u_ref`, in the conditions of
-    /// optimality of its QP. They are small multiples of 1e-16 for a pointwise step. Where the step looked over the
-    /// period ([`Report::predicted`]) they are of the rows linearised at `u`, and up to the 1e-9 at which the search
-    /// stops. `None` where no QP was solved. Costs another solve: a check, not for every step.
+    /// The residuals of `u`, the answer of the last [`Self::step`] or [`Self::peek`] to `u_ref`, in the optimality
+    /// conditions of its QP. For a pointwise step they are small multiples of 1e-16. If the step looked over the period
+    /// ([`Report::predicted`]), they are those of the rows linearised at `u`, and as large as the 1e-9 at which the search
+    /// stops. `None` if no QP was solved. Costs another solve: a check, not for every step.
     ///
     /// # Errors
     ///
@@ -86,8 +86,8 @@ impl Filter {
         self.rows.slots.iter().map(|slot| slot.name.as_str())
     }
 
-    /// The reason why barrier `index` goes by another method than the configured one since its anchor
-    /// ([`BarrierReport::fallback`]); `None` where it does not. Recomputed at every call: not for every step.
+    /// Why barrier `index` has used another method than the configured one since its anchor ([`BarrierReport::fallback`]);
+    /// `None` if it has not. Recomputed at every call: not for every step.
     pub fn refusal(&self, index: usize) -> Option<Refusal> {
         self.rows.slots.get(index)?.promise.refusal(self.rows.state.barriers.get(index)?)
     }

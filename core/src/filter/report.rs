@@ -6,32 +6,32 @@ use crate::convergence::{DerivativeBound, FixedTimeState, Phase};
 use crate::elementary::{self, dot};
 use crate::qp::{Active, Constraint, Row, Solver};
 
-/// Part of the deadline without progress in [`BarrierReport::deadlocked`].
+/// Part of the deadline that passes without progress before a barrier counts as [`BarrierReport::deadlocked`].
 const DEADLOCK_TIME: f64 = 0.1;
 
-/// The end of a step, and so the meaning of the returned input. The numbers are stable: they leave the
-/// library as the FMU's `status`.
+/// How a step ended, and so the meaning of the returned input. The numbers are stable: they leave the library as the FMU's
+/// `status`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 #[repr(u8)]
 pub enum Status {
-    /// u_ref satisfies every constraint; the input is u_ref, bit for bit. Where an input is integrated, that is its rate: the
-    /// input itself then differs from its u_ref as far as the integral does.
+    /// u_ref satisfies every constraint, and the input is u_ref, bit for bit. If an input is integrated, this holds for its
+    /// rate; the input itself then differs from its u_ref as far as the integral does.
     #[default]
     Unchanged = 0,
     /// The input is the point nearest to u_ref that satisfies every constraint.
     Filtered = 1,
-    /// The constraints cannot be met within the input bounds: the bounded input of least violation.
+    /// The constraints cannot be met within the input bounds: the input within the bounds that violates them least.
     Infeasible = 2,
-    /// A constraint's row is so small that no reasonable input meets it (the barrier cannot be
-    /// influenced at this instant): the bounded input of least violation, or u_ref without bounds. Where
-    /// the constraint is enforced on a predicted state ([`Sampling`](super::Sampling)), also: no input was
-    /// found that meets it, and the returned one is the best of the search, finite and within bounds.
+    /// A constraint's row is so small that no reasonable input meets it (the barrier cannot be influenced at this instant):
+    /// the input within the bounds that violates it least, or u_ref if there are no bounds. If the constraint is enforced on
+    /// a predicted state ([`Sampling`](super::Sampling)), this status also means that no input was found that meets it; the
+    /// returned one is the best of the search, finite and within the bounds.
     NoAuthority = 3,
-    /// Time, state or reference input is not a number or infinite: the admissible input nearest 0.
-    /// Nothing is remembered but that guarantees already given are lost.
+    /// Time, state or reference input is not a number or infinite: the admissible input nearest 0. Nothing is remembered
+    /// except that guarantees already given are lost.
     InvalidInput = 4,
     /// The model's derivatives are not finite at this state: the admissible input nearest 0.
     Singular = 5,
@@ -40,10 +40,11 @@ pub enum Status {
     WrongRelativeDegree = 6,
     /// The solver for several rows did not converge: u_ref within its bounds.
     SolverFailed = 7,
-    /// The constraints are not met, or lead where no way on is left, and a plan that keeps every promise decides. Only
+    /// The constraints are not met, or they lead to a state without a plan; a plan that keeps every promise decides. Only
     /// from a filter that follows plans ([`Filter::with_plans`](super::Filter::with_plans)).
     Backup = 8,
-    /// The filter is [not armed](super::FilterBuilder::arm_after) yet: nothing is asked or promised, u_ref within its bounds.
+    /// The filter is [not armed](super::FilterBuilder::arm_after) yet: nothing is asked or promised, and the input is u_ref
+    /// within its bounds.
     NotArmed = 9,
 }
 
@@ -62,12 +63,12 @@ impl Status {
         Self::NotArmed,
     ];
 
-    /// Its name, as the FMU's enumeration has it.
+    /// Its name, as in the FMU's enumeration.
     pub fn name(self) -> &'static str {
         self.words().0
     }
 
-    /// The meaning of the returned input, in a few words.
+    /// The meaning of the returned input, in brief.
     pub fn meaning(self) -> &'static str {
         self.words().1
     }
@@ -94,7 +95,7 @@ impl Status {
         Self::ALL.into_iter().find(|status| *status as i32 == number)
     }
 
-    /// Whether no constraint was enforced: no valid input, no finite model, no row that is one, no convergence, not armed.
+    /// Whether no constraint was enforced: no valid input, no finite model, no correct row, no convergence, or not armed.
     pub fn is_abstention(self) -> bool {
         matches!(
             self,
@@ -112,19 +113,19 @@ impl Status {
     }
 }
 
-/// One barrier's part of a [`Report`]. With an [actuation delay](super::FilterBuilder::actuation_delay) all but h is of the instant
-/// at which the input of the sample acts.
+/// One barrier's part of a [`Report`]. With an [actuation delay](super::FilterBuilder::actuation_delay), all values but h
+/// refer to the instant at which the input of the sample acts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct BarrierReport {
-    /// h now, in its own unit; not a number where the state is not.
+    /// h now, in its own unit; NaN if the state is.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub h: f64,
     /// The phase of the barrier's promise.
     pub phase: Phase,
-    /// The value that the constraint aims to keep h above at this time, in the unit of h: the profile with the margin on top.
-    /// Held inputs use the margin up, so what is promised is this less [`Self::margin`].
+    /// The value that the constraint aims to keep h above at this time, in the unit of h: the profile plus the margin. Held
+    /// inputs use up the margin, so the promised value is this less [`Self::margin`].
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub profile: f64,
     /// Time to the deadline in s, 0 from the deadline on.
@@ -135,47 +136,45 @@ pub struct BarrierReport {
     /// Time in s of the first sample with h ≥ 0 since the anchor.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub arrival_time: Option<f64>,
-    /// Whether there is a backup plan: one that was checked in the model, that keeps this barrier's promise within the
-    /// bounds whatever u_ref is. Only from a filter that follows plans ([`Filter::with_plans`](super::Filter::with_plans)).
+    /// Whether there is a backup plan: one that was checked in the model and keeps this barrier's promise within the bounds,
+    /// whatever u_ref is. Only from a filter that follows plans ([`Filter::with_plans`](super::Filter::with_plans)).
     pub guaranteed: bool,
     /// Whether the theorem behind the present phase applies: its conditions held at a sample of this phase, and every step
     /// since then was satisfied. It does not say that an input will exist at later samples.
     pub on_course: bool,
-    /// μ in force since the anchor, `[h]`: the settings' margin, or what plans behind the rows need where that is
-    /// more, and the expected cost of held inputs.
+    /// μ in force since the anchor, `[h]`: the margin of the settings, or the larger one that plans behind the rows need,
+    /// plus the expected cost of held inputs.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub margin: f64,
-    /// Whether the configured method could not be used from the anchor and another took its place
+    /// Whether the configured method could not be used from the anchor, so that another replaced it
     /// ([`Filter::refusal`](super::Filter::refusal) says why).
     pub fallback: bool,
-    /// Number of times that leaving the set has re-armed the deadline (the settings' `recovery`).
+    /// How many times leaving the set has re-armed the deadline (the settings' `recovery`).
     pub recoveries: u32,
-    /// Whether no input within the bounds has h ≥ 0 at the deadline ([`reach`](crate::reach)): true from the
-    /// first sample of the approach at which that is certain, for plants and barriers that know it.
+    /// Whether no input within the bounds has h ≥ 0 at the deadline ([`reach`](crate::reach)): true from the first sample of
+    /// the approach at which this is certain, for plants and barriers that can tell.
     pub deadline_unreachable: bool,
-    /// Number of deadlines given up for a later one, because the bounds do not allow them (the settings'
-    /// `infeasible`). Time left, profile and guarantee are then about the later one.
+    /// How many deadlines were given up for a later one because the bounds do not allow them (the settings' `infeasible`).
+    /// Time left, profile and guarantee then refer to the later one.
     pub postponed: u32,
-    /// The row aᵀu ≥ b given to the QP; a and b in `[h]`/sⁿ. Where the step looked over the sampling period
-    /// ([`Report::predicted`]), its linearisation at the returned u.
+    /// The row aᵀu ≥ b given to the QP; a and b in `[h]`/sⁿ. If the step looked over the sampling period
+    /// ([`Report::predicted`]), this is its linearisation at the returned u.
     pub row: Row,
-    /// aᵀu − b at the returned u: < 0 where the row is violated, by that much.
+    /// aᵀu − b at the returned u: < 0 by the amount of the violation.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub slack: f64,
-    /// Steps in a row that have not met the constraint, this one included.
+    /// Number of consecutive steps that have not met the constraint, including this one.
     pub unmet_steps: u32,
-    /// The number of the barrier whose row is active and points most against this one's, if there is one and this
-    /// one's constraint is not met.
+    /// If the constraint is not met: the number of the barrier whose active row points most against this one's, if there is
+    /// one.
     pub blocked_by: Option<usize>,
-    /// Whether the barrier is blocked and getting nowhere: for a tenth of its deadline its constraint has not
-    /// been met, and h has not risen by a hundredth of its size. A u_ref that goes around leads out of it
-    /// (`Heading::around` of the reference controllers), if this barrier lets it: a hard one that is not
-    /// met stays at its least violation, whatever u_ref is; a soft one
-    /// ([`Strictness::Soft`](super::Strictness::Soft)) yields to it.
+    /// Whether the barrier is blocked and makes no progress: for a tenth of its deadline its constraint has not been met,
+    /// and h has not risen by a hundredth of its size. A u_ref that goes around leads out of it (`Heading::around` of the
+    /// reference controllers), if this barrier allows it: a hard barrier that is not met stays at its least violation,
+    /// whatever u_ref is; a soft one ([`Strictness::Soft`](super::Strictness::Soft)) yields.
     pub deadlocked: bool,
-    /// Expected fall of h below its promise within the period because the input is held, `[h]`: the loss that
-    /// the margin has to cover ([`sampled`](crate::convergence::sampled), (5)). 0 where the step did not look
-    /// over the period.
+    /// Expected fall of h below its promise within the period because the input is held, `[h]`: the loss that the margin has
+    /// to cover ([`sampled`](crate::convergence::sampled), (5)). 0 if the step did not look over the period.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub sampling_loss: f64,
 }
@@ -258,22 +257,22 @@ pub struct Report {
     /// Time of the sample in s.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub time: f64,
-    /// The end of the step.
+    /// How the step ended.
     pub status: Status,
     /// The method that solved the QP.
     pub solver: Solver,
-    /// Rounds of the active-set method, else 0. It alone depends on more than
-    /// the filter's state: a step is faster where the same rows and bounds are active as in the one before.
+    /// Rounds of the active-set method, otherwise 0. This field alone depends on more than the filter's state: a step is
+    /// faster if the same rows and bounds are active as in the one before.
     pub iterations: u32,
     /// The sampling period in s that the step accounted for, 0 for the pointwise constraint.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub period: f64,
-    /// Whether the constraint was enforced over the period, with the state at its end predicted by the
-    /// model; false also where a source cannot predict.
+    /// Whether the constraint was enforced over the period, with the state at its end predicted by the model. Also false if
+    /// a source cannot predict.
     pub predicted: bool,
     /// One entry per barrier, in the order they were added.
     pub barriers: Vec<BarrierReport>,
-    /// Whether the promises are kept, who chose the input and why; `None` from a filter without plans.
+    /// Whether the promises are kept, which source chose the input, and why; `None` from a filter without plans.
     #[cfg(feature = "plan")]
     pub assurance: Option<super::Assurance>,
 }
@@ -304,8 +303,8 @@ impl Report {
         self.barriers.iter().enumerate().filter(|(_, b)| b.unmet_steps > 0).map(|(i, _)| i)
     }
 
-    /// Finds the `active` row that blocks each barrier that is not met, and whether that is a deadlock.
-    /// `barrier` is the number of the barrier that a row belongs to.
+    /// Finds the `active` row that blocks each unmet barrier, and whether that is a deadlock. `barrier` maps a row to the
+    /// number of its barrier.
     pub(super) fn find_deadlocks(
         &mut self,
         t: f64,
@@ -334,7 +333,7 @@ impl Report {
         }
     }
 
-    /// Resets all but the barriers, which a sample rewrites.
+    /// Resets everything except the barriers, which a sample rewrites.
     pub(super) fn reset(&mut self, t: f64) {
         self.time = t;
         self.status = Status::Unchanged;

@@ -1,28 +1,25 @@
-//! The time for which an input is held, and how much of it the constraint accounts for (`docs/theory.md#period`).
+//! The time for which an input is held, and how the constraint accounts for it (`docs/theory.md#period`).
 //!
-//! The constraint over a period is (S) of [`crate::convergence::sampled`]. [`super::search`] finds
-//! the input that meets it.
+//! The constraint over a period is (S) of [`crate::convergence::sampled`]. [`super::search`] finds the input that meets it.
 
 use super::FilterState;
 use crate::error::{Error, positive};
 
-/// The account that a filter takes of inputs held between samples.
+/// How a filter accounts for inputs that are held between samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Sampling {
-    /// None: the constraint is enforced at the samples, and the margin has to cover the cost of held inputs,
-    /// Mδ/aⁿ.
+    /// Not at all: the constraint is enforced at the samples, and the margin has to cover the cost of held inputs, Mδ/aⁿ.
     Pointwise,
-    /// The constraint is enforced over the period since the step before, taken as the next one's length, or over a
-    /// longer one that was seen not long ago. A period is forgotten within a hundred of its length, so a very short
-    /// step between long ones changes nothing. After a gap the period at most doubles from step to step. Where
-    /// somebody says how long the next one is ([`Filter::expect_hold`](super::Filter::expect_hold)), it
-    /// is that. The default.
+    /// The default. The constraint is enforced over the period since the last step, taken as the length of the next one, or
+    /// over a longer period seen recently. A period is forgotten within a hundred times its length, so a very short step
+    /// between long ones changes nothing. After a gap the period at most doubles from step to step. If the length of the
+    /// next period is given ([`Filter::expect_hold`](super::Filter::expect_hold)), that is used.
     Measured {
-        /// The period in s, finite, > 0, of the first step, before any is measured. Default: a hundredth
-        /// of the shortest deadline.
+        /// The period in s, finite, > 0, of the first step, before any is measured. Default: a hundredth of the shortest
+        /// deadline.
         first: Option<f64>,
     },
     /// The constraint is enforced over this period in s, finite, > 0.
@@ -52,8 +49,8 @@ impl Sampling {
         }
     }
 
-    /// The period in s that a step at `t` looks over, `None` for the pointwise constraint. The `expected` one is
-    /// taken where it differs from the measured one by more than round-off.
+    /// The period in s that a step at `t` looks over; `None` for the pointwise constraint. The `expected` one is used if it
+    /// differs from the measured one by more than round-off.
     pub(super) fn period(
         self,
         state: &FilterState,
@@ -74,10 +71,10 @@ impl Sampling {
         }
     }
 
-    /// The longest time in s that a hold of `hold` s may turn out to last; `reported`: somebody gave its length.
+    /// The longest time in s that a hold of `hold` s may turn out to last; `reported`: its length was given.
     pub(super) fn longest(self, hold: f64, reported: bool) -> f64 {
-        /// Longest next step over the measured one, seldom exceeded where steps are drawn at random between half of the
-        /// longest and the longest.
+        /// Longest next step, in units of the measured one. It is seldom exceeded if steps are drawn at random between half
+        /// of the longest and the longest.
         const JITTER: f64 = 1.25;
         match self {
             Self::Measured { .. } if !reported => JITTER * hold,
@@ -86,18 +83,18 @@ impl Sampling {
     }
 }
 
-/// The period in s that samples up to `t` show: that of the last step, or of longer ones not long before.
+/// The period in s that the samples up to `t` show: that of the last step, or of longer ones shortly before.
 fn measured(state: &FilterState, t: f64, first: f64) -> f64 {
-    /// Decrease of a longer period per time that passes: it is forgotten within a hundred of its length.
+    /// Decrease of a longer period per elapsed time: it is forgotten within a hundred times its length.
     const FORGOTTEN: f64 = 0.01;
-    /// Largest growth from step to step.
+    /// Largest growth of the period from step to step.
     const GROWTH: f64 = 2.0;
-    /// A first step shorter than this part of the expected one says nothing.
+    /// A first step shorter than this part of the expected one carries no information.
     const TINY: f64 = 1e-3;
     let Some(last) = state.time else { return first };
     let passed = t - last;
     match state.period {
-        // A sample at the same time, or an earlier one, says nothing new.
+        // A sample at the same time, or an earlier one, carries no new information.
         known if passed <= 0.0 => known.unwrap_or(first),
         Some(known) => passed.min(GROWTH * known).max(known - FORGOTTEN * passed),
         None if passed < TINY * first => first,

@@ -1,7 +1,8 @@
-//! The state and the barrier's derivatives a moment ahead, under an input that is held.
+//! The state and the barrier's derivatives a moment ahead, under a held input.
 //!
 //! The classical Runge-Kutta method runs on numbers that carry their derivatives along u. It gives the state x(t + σ) after
-//! σ seconds, and its derivative by u. The series of h started there gives h⁽ᵏ⁾(t + σ) and its total derivative,
+//! σ seconds, and its derivative with respect to u. The series of h started there gives h⁽ᵏ⁾(t + σ) and its total
+//! derivative,
 //!
 //! ```math
 //! \frac{\partial h^{(k)}(t+\sigma)}{\partial u}
@@ -9,8 +10,8 @@
 //! \qquad k = 0 \dots n. \tag{4}
 //! ```
 //!
-//! The error is the integrator's, O(σ⁵). One step does where the rate of the state hardly curves over it ([`EVEN`]), else
-//! [`SUBSTEPS`] are taken. (4) is the exact derivative of what is computed, so Newton's method on it converges
+//! The error is the integrator's, O(σ⁵). One step suffices if the rate of the state is hardly curved over it ([`EVEN`]);
+//! otherwise [`SUBSTEPS`] are taken. (4) is the exact derivative of what is computed, so Newton's method on it converges
 //! quadratically.
 
 use core::array::from_fn;
@@ -26,7 +27,7 @@ use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 /// Runge-Kutta steps per prediction.
 pub const SUBSTEPS: usize = 2;
 
-/// Derivatives of one barrier a moment ahead along a held input, as plain numbers.
+/// Derivatives of one barrier a moment ahead under a held input, as plain numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ahead {
     /// `value[k]` = h⁽ᵏ⁾ at the end of the moment for k = 0 ..= n, in `[h]`/s^k; zeros above n.
@@ -79,22 +80,22 @@ where
     x
 }
 
-/// Largest curvature of the rates over one Runge-Kutta step, as a part of a rate, for one step to do.
+/// Largest curvature of the rates over one Runge-Kutta step, as a part of a rate, for which one step suffices.
 const EVEN: f64 = 4e-4;
 
-/// How often the difference of the two stages in the middle counts in the curvature, beside the second difference of all.
+/// Weight of the difference of the two middle stages in the curvature, beside the second difference of all stages.
 ///
-/// Where a state turns by φ as other states grow evenly, the stages in the middle agree, the second difference is φ²/4 and the
-/// step is off by φ⁴/2880 of the way. Where a state decays by the factor e⁻ᶻ both are z²/4 and it is off by z⁴/120. Both are
-/// 1e-9 where the curvature is [`EVEN`]; two steps are off by a sixteenth of that.
+/// If a state turns by φ as other states grow linearly, the middle stages agree, the second difference is φ²/4 and the error
+/// of the step is φ⁴/2880 of the distance. If a state decays by the factor e⁻ᶻ, both are z²/4 and the error is z⁴/120. Both
+/// are 1e-9 where the curvature is [`EVEN`]; the error of two steps is a sixteenth of that.
 const MIDDLE: f64 = 3.0;
 
-/// How often its own curvature a rate counts at most, where curvatures are compared with the largest rate. Rates of
-/// different states have different units, and one that is constant says nothing of the others: that a vehicle is spun does
-/// not make its way straight.
+/// Largest size with which a rate counts, in units of its own curvature, when curvatures are compared with the largest rate.
+/// Rates of different states have different units, and one that is constant shows nothing of the others: the path of a
+/// vehicle is not straight because the vehicle spins at a constant rate.
 const COUNTS: f64 = 1e6;
 
-/// Whether the rates at the four stages of a Runge-Kutta step, state by state, curve so little that one step does.
+/// Whether the rates at the four stages of a Runge-Kutta step, state by state, are curved so little that one step suffices.
 #[inline(always)]
 pub fn is_even<S: Scalar>([k1, k2, k3, k4]: [&[S]; 4]) -> bool {
     let (mut most, mut largest) = (0.0_f64, 0.0_f64);
@@ -107,7 +108,8 @@ pub fn is_even<S: Scalar>([k1, k2, k3, k4]: [&[S]; 4]) -> bool {
     most <= EVEN * largest
 }
 
-/// The rates of the states as numbers that carry derivatives along u: f(x) + g(x) u, by the product rule. `x` carries its own.
+/// The rates of the states as numbers that carry derivatives along u: f(x) + g(x) u, by the product rule. `x` carries its
+/// own.
 #[inline(always)]
 fn rate<P, const NX: usize, const NU: usize>(plant: &P, x: &[Dual<NU>; NX], u: &[f64; NU]) -> [Dual<NU>; NX]
 where
@@ -116,7 +118,7 @@ where
     let (mut rate, g) = (plant.drift(x), plant.input_map(x));
     for m in 0..NU {
         for i in 0..NX {
-            // What is constantly zero or one is known to the compiler.
+            // The compiler knows what is constantly zero or one.
             let Dual { value, gradient } = &g[i][m];
             if *value != 0.0 {
                 rate[i].value += value * u[m];
@@ -169,7 +171,7 @@ where
     stepped
 }
 
-/// The state `duration` seconds after `x`, where the rate is `k1`: by one Runge-Kutta step where that does, else by
+/// The state `duration` seconds after `x`, at which the rate is `k1`: by one Runge-Kutta step if that suffices, otherwise by
 /// [`SUBSTEPS`].
 #[inline(always)]
 fn run<S, const NX: usize>(
@@ -188,7 +190,7 @@ where
     run_in_parts(&rate, x, k1, duration)
 }
 
-/// The same by [`SUBSTEPS`], apart from what short periods take.
+/// The same by [`SUBSTEPS`], separate from the code for short periods.
 #[inline(never)]
 fn run_in_parts<S, const NX: usize>(
     rate: &impl Fn(&[S; NX]) -> [S; NX],
@@ -210,8 +212,8 @@ where
     x
 }
 
-/// The state `duration` ≥ 0 seconds after `x` under the held input `u`, with its derivatives along u. Once for a plant,
-/// whatever the barriers.
+/// The state `duration` ≥ 0 seconds after `x` under the held input `u`, with its derivatives along u. Compiled once per
+/// plant, whatever the barriers.
 #[inline(never)]
 fn arrival<P, const NX: usize, const NU: usize>(
     plant: &P,
@@ -253,7 +255,7 @@ where
     run(rate, x, &rate(x), duration)
 }
 
-/// The series of the states from `x` on under the held input `u`, `K` coefficients.
+/// The series of the states from `x` under the held input `u`, `K` coefficients.
 #[inline(always)]
 fn series<P, S, const NX: usize, const NU: usize, const K: usize>(
     plant: &P,
@@ -295,8 +297,8 @@ where
     series
 }
 
-/// Writes the expansions of the states from `x` on under the held input `u`: `J x_J = [f(x)]_{J−1} + [g(x)]_{J−1} u`. Once
-/// for a plant, whatever the barriers: it is much code.
+/// Writes the expansions of the states from `x` under the held input `u`: `J x_J = [f(x)]_{J−1} + [g(x)]_{J−1} u`. Compiled
+/// once per plant, whatever the barriers, since it is much code.
 #[inline(never)]
 pub(super) fn path<P, const NX: usize, const NU: usize>(
     plant: &P,
@@ -329,7 +331,7 @@ pub(super) fn path<P, const NX: usize, const NU: usize>(
     }
 }
 
-/// The expansion of `barrier` along `path`, from `t` on. Once for a barrier, whatever the plants and degrees.
+/// The expansion of `barrier` along `path`, starting at `t`. Compiled once per barrier, whatever the plants and degrees.
 #[inline(never)]
 pub(super) fn value_along<B, const NX: usize>(barrier: &B, t: f64, path: &[Expansion]) -> Expansion
 where
@@ -345,8 +347,8 @@ fn first_over<const NX: usize, const K: usize>(path: &[ExpansionOver]) -> [Taylo
     from_fn(|i| Taylor { coefficients: from_fn(|k| path[i][k]) })
 }
 
-/// Writes the first `K` coefficients of the rate of `plant` under `u` on enclosures of the expansions of the states. Once
-/// for a plant.
+/// Writes the first `K` coefficients of the rate of `plant` under `u` on enclosures of the expansions of the states.
+/// Compiled once per plant.
 #[inline(never)]
 pub(super) fn rates_over<P, const NX: usize, const NU: usize, const K: usize>(
     plant: &P,
@@ -366,7 +368,7 @@ pub(super) fn rates_over<P, const NX: usize, const NU: usize, const K: usize>(
     }
 }
 
-/// `barrier` on enclosures of time and of the expansions of the states. Once for a barrier.
+/// `barrier` on enclosures of time and of the expansions of the states. Compiled once per barrier.
 #[inline(never)]
 pub(super) fn value_over<B, const NX: usize>(barrier: &B, time: Interval, path: &[ExpansionOver]) -> Interval
 where
@@ -375,7 +377,8 @@ where
     barrier.value(time, &from_fn(|i| path[i][0]))
 }
 
-/// The last coefficient of the expansion of `barrier` on enclosures of time and of those of the states. Once for a barrier.
+/// The last coefficient of the expansion of `barrier` on enclosures of time and of those of the states. Compiled once per
+/// barrier.
 #[inline(never)]
 pub(super) fn last_over<B, const NX: usize>(barrier: &B, time: Interval, path: &[ExpansionOver]) -> Interval
 where
@@ -385,7 +388,7 @@ where
     barrier.value(time_over(time), &states).coefficients[EXPANSION_ORDERS - 1]
 }
 
-/// Time from anywhere in `time` on.
+/// Time as an expansion that starts anywhere in `time`.
 #[inline(always)]
 fn time_over<const K: usize>(time: Interval) -> Taylor<Interval, K> {
     let mut expansion = Taylor::time(0.0);
@@ -393,8 +396,7 @@ fn time_over<const K: usize>(time: Interval) -> Taylor<Interval, K> {
     expansion
 }
 
-/// A number that h does not fall below until `dt` s after `t` and `x` under the held input `u`: sharper where it would be less
-/// than `wanted`.
+/// A lower bound on h until `dt` s after `t` and `x` under the held input `u`, sharpened if it would be less than `wanted`.
 #[inline(never)]
 pub(super) fn lowest_held<P, B, const NX: usize, const NU: usize>(
     (plant, barrier): (&P, &B),
@@ -430,7 +432,7 @@ where
     enclosure::sharper(low, barrier.value(t, &x), slope, dt)
 }
 
-/// The series of the states from [`arrival`] on under the held input `u`, `K` coefficients, with their derivatives along u.
+/// The series of the states from [`arrival`] under the held input `u`, `K` coefficients, with their derivatives along u.
 #[inline(always)]
 pub(super) fn motion<P, const NX: usize, const NU: usize, const K: usize>(
     plant: &P,
@@ -464,7 +466,7 @@ pub(super) fn evaluate<B, const NX: usize, const NU: usize, const K: usize>(
     }
 }
 
-/// The values that [`evaluate`] writes, alone. Leaves the rest of `out` as it is.
+/// Only the values that [`evaluate`] writes. Leaves the rest of `out` as it is.
 #[inline]
 pub(super) fn values<P, B, const NX: usize, const NU: usize, const K: usize>(
     (plant, barrier): (&P, &B),

@@ -1,13 +1,13 @@
-//! The relative degree: the order of the first derivative of a barrier that inputs enter.
+//! The relative degree: the order of the first derivative of a barrier that the inputs enter.
 //!
 //! A constraint for relative degree n needs every input that reaches h to enter h⁽ⁿ⁾, and none to enter an earlier
-//! derivative. An input that never enters is harmless: the steering of a vehicle does not act on a speed limit. Inputs
-//! that enter at *different* orders are not harmless. A row on h⁽ⁿ⁾ with the lower n uses only the input that comes
-//! first; with the higher n it is wrong.
+//! derivative. An input that never enters is harmless: the steering of a vehicle does not act on a speed limit. Inputs that
+//! enter at *different* orders (mixed relative degree) are not harmless. A row on h⁽ⁿ⁾ with the lower n uses only the input
+//! that comes first; with the higher n it is wrong.
 //!
 //! The orders are read off the gradients of `barrier_series` at sample states. At a sample a gradient may vanish by
-//! accident: at the centre of a disc, or standing still. So where an order is not the lowest found, two neighbours of
-//! the sample are asked as well.
+//! accident: at the centre of a disc, or at standstill. So if an order is not the lowest found, two neighbours of the sample
+//! are also evaluated.
 
 use alloc::vec::Vec;
 use core::array::from_fn;
@@ -23,23 +23,22 @@ use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 /// Number of Taylor coefficients taken: every order that is supported.
 const K: usize = MAX_RELATIVE_DEGREE + 1;
 
-/// An input counts where the gradient of a Taylor coefficient, scaled by the time scale of h along the
-/// drift, exceeds this part of the largest: far above round-off, far below a real effect.
+/// An input counts if the gradient of a Taylor coefficient, scaled by the time scale of h along the drift, exceeds this part
+/// of the largest: far above round-off, far below a real effect.
 const SIGNIFICANT: f64 = 1e-12;
 
 /// Number of sample states of [`detected`].
 const SAMPLES: usize = 16;
 
-/// The largest part of samples that may have another order than the rest and be passed over: 1 in 8.
+/// Largest part of samples that may have another order than the rest and be ignored, as 1 in this number.
 const PASSED_OVER: usize = 8;
 
 impl RelativeDegree {
-    /// n, if it is uniform and equals `declared` where that is given.
+    /// n, if it is uniform and equals `declared`, if that is given.
     ///
     /// # Errors
     ///
-    /// [`ErrorKind::RelativeDegree`] otherwise, with the finding behind
-    /// [`Error::relative_degree`].
+    /// [`ErrorKind::RelativeDegree`] otherwise, with details in [`Error::relative_degree`].
     pub fn require(self, declared: Option<usize>) -> Result<usize, Error> {
         let advice = match (&self, declared) {
             (&Self::Uniform(n), None) => return Ok(n),
@@ -59,8 +58,8 @@ impl RelativeDegree {
     }
 }
 
-/// The relative degree of `barrier` along `plant`, found at time `t` (s) and the states `samples`.
-/// Samples at which the model is not finite are passed over.
+/// The relative degree of `barrier` along `plant`, found at time `t` (s) and the states `samples`. Samples at which the
+/// model is not finite are ignored.
 ///
 /// ```
 /// use punctual_core::barriers::DistanceDisc;
@@ -100,9 +99,9 @@ where
     relative_degree_of(NU, samples, |t, x| coefficients(plant, barrier, t, x))
 }
 
-/// Samples to find a relative degree on: times from 0 to 10 s and states within `ranges` (`[min, max]` of each
-/// component, or infinite). A component without a range has either sign and a size from 0.01 to 100; with one
-/// end, it is that far away from it. The same samples on every call.
+/// Samples for finding a relative degree: times from 0 to 10 s and states within `ranges` (`[min, max]` of each component,
+/// or infinite). A component without a range has either sign and a size from 0.01 to 100; with one end, it is that far from
+/// it. The same samples on every call.
 pub fn samples(ranges: &[[f64; 2]]) -> Vec<(f64, Vec<f64>)> {
     let mut numbers = Numbers(0);
     let mut state = |range: &[f64; 2]| match range.map(f64::is_finite) {
@@ -120,8 +119,8 @@ pub fn samples(ranges: &[[f64; 2]]) -> Vec<(f64, Vec<f64>)> {
 /// The first Taylor coefficients of h(t, x(t)) at u = 0, each with its derivatives along the inputs.
 pub type Coefficients = [(f64, [f64; MAX_INPUTS]); MAX_RELATIVE_DEGREE + 1];
 
-/// The relative degree of a model with `inputs` ≤ [`MAX_INPUTS`] inputs that is not one of the traits', found at
-/// times (s) and states `samples` from its `series(t, x)`. Samples at which that is not finite are passed over.
+/// The relative degree of a model with `inputs` ≤ [`MAX_INPUTS`] inputs that does not implement the traits. It is found at
+/// the times (s) and states of `samples` from `series(t, x)`. Samples at which that is not finite are ignored.
 pub fn relative_degree_of(
     inputs: usize,
     samples: impl IntoIterator<Item = (f64, Vec<f64>)>,
@@ -156,11 +155,11 @@ type Orders = [Option<usize>; MAX_INPUTS];
 
 /// The orders found on the samples.
 struct Findings {
-    /// Number of inputs; orders are `None` for those above.
+    /// Number of inputs; orders are `None` for higher indices.
     inputs: usize,
-    /// Per input the lowest order over all samples.
+    /// The lowest order of each input over all samples.
     lowest: Orders,
-    /// `first[k]`: number of samples at which the input that comes first enters at order k.
+    /// `first[k]`: number of samples at which the first input to enter does so at order k.
     first: [usize; K],
     /// Samples at which everything was finite.
     finite: usize,
@@ -168,8 +167,8 @@ struct Findings {
 
 impl Findings {
     fn add(&mut self, t: f64, x: &[f64], series: &mut impl FnMut(f64, &[f64]) -> Coefficients) {
-        /// Distance of a neighbour, as a part of the component and absolutely. A gradient that vanishes at the
-        /// sample only is seen that far away.
+        /// Distance of a neighbour, as a part of the component and absolutely. A gradient that vanishes only at the sample
+        /// shows at that distance.
         const AWAY: f64 = 1e-3;
         let Some(mut orders) = orders(&series(t, x)) else { return };
         let mut numbers = Numbers(1);
@@ -218,13 +217,13 @@ fn lower(mut a: Orders, b: Orders) -> Orders {
     a
 }
 
-/// The orders at one sample, `None` where the model is not finite.
+/// The orders at one sample; `None` if the model is not finite.
 fn orders(c: &Coefficients) -> Option<Orders> {
     if !c.iter().all(|(value, gradient)| value.is_finite() && gradient.iter().all(|d| d.is_finite())) {
         return None;
     }
-    // Gradients of different orders have different units; the time in which the changes of h along the
-    // drift change themselves makes them comparable. (Not h itself: it may have any offset.)
+    // Gradients of different orders have different units. The time scale on which the changes of h along the drift
+    // themselves change makes them comparable. (Not h itself: it may have any offset.)
     let changes = || (1..K).filter(|&k| c[k].0 != 0.0);
     let ratio = |j: usize, k: usize| elementary::powf((c[j].0 / c[k].0).abs(), 1.0 / (k - j) as f64);
     let time = changes().next().and_then(|j| changes().skip(1).map(|k| ratio(j, k)).reduce(f64::min));
@@ -238,7 +237,7 @@ fn orders(c: &Coefficients) -> Option<Orders> {
     Some(found)
 }
 
-/// Numbers in [0, 1) that look random and are always the same (SplitMix64).
+/// Pseudo-random numbers in [0, 1) that are always the same (SplitMix64).
 struct Numbers(u64);
 
 impl Numbers {

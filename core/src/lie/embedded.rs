@@ -1,4 +1,4 @@
-//! A source of derivatives that knows some of the filter's states.
+//! A source of derivatives that depends on some of the filter's states.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -11,7 +11,7 @@ use crate::MAX_RELATIVE_DEGREE;
 use crate::error::{Error, ErrorKind, length};
 use crate::interval::Interval;
 
-/// Most states that a picked source may have.
+/// Largest number of states of a picked source.
 const MAX_PICKED: usize = 32;
 
 struct Embedded {
@@ -21,7 +21,7 @@ struct Embedded {
 }
 
 impl Embedded {
-    /// The source's own states of all, and zeros after them.
+    /// The source's own states, picked from all of them, followed by zeros.
     fn picked(&self, x: &[f64]) -> [f64; MAX_PICKED] {
         let mut own = [0.0; MAX_PICKED];
         for (slot, &pick) in own.iter_mut().zip(&self.picks) {
@@ -30,7 +30,7 @@ impl Embedded {
         own
     }
 
-    /// The same of enclosures, and nothing known after them.
+    /// The same for enclosures, followed by unbounded intervals.
     fn picked_over(&self, path: &[ExpansionOver]) -> [ExpansionOver; MAX_PICKED] {
         let mut own = [[Interval::ALL; EXPANSION_ORDERS]; MAX_PICKED];
         for (own, &pick) in own.iter_mut().zip(&self.picks) {
@@ -39,7 +39,7 @@ impl Embedded {
         own
     }
 
-    /// Writes the source's own states into all.
+    /// Writes the source's own states back into all.
     fn put_back(&self, own: &[f64; MAX_PICKED], x: &mut [f64]) {
         for (&pick, value) in self.picks.iter().zip(own) {
             x[pick] = *value;
@@ -224,12 +224,12 @@ impl PredictDirectional for Embedded {
     }
 }
 
-/// `source` as one of a filter with `state_dim` states: its own states are those numbered `picks`, counted
-/// from 0, in that order. For barriers that need different parts of a long state.
+/// `source` as one of a filter with `state_dim` states: its own states are those numbered `picks`, counted from 0, in that
+/// order. For barriers that need different parts of a long state.
 ///
 /// # Errors
 ///
-/// Not as many picks as the source has states, more than 32 of them, one that is not a state.
+/// The number of picks differs from the source's number of states; there are more than 32; or one is not a state.
 pub fn embedded(
     source: Box<dyn DerivativeSource>,
     state_dim: usize,

@@ -1,14 +1,14 @@
-//! Everything that a held input leads to within a time, enclosed.
+//! An enclosure of all states to which a held input leads within a time.
 
 use crate::interval::Interval;
 
-/// Most trials. The second knows which states begin to move, the others what those move.
+/// Largest number of trials. The second knows which states begin to move, the others what those move.
 const TRIALS: u32 = 8;
 
-/// Encloses the states until `dt` s after `x`, where their rate is `rate`, and their rates on the way: `[i][0]` and `[i][1]` of
-/// `states`. `rates` writes the latter to `[i][1]` for the former. Returns whether it did.
+/// Encloses the states until `dt` s after `x`, where their rate is `rate`, and their rates until then: `[i][0]` and `[i][1]`
+/// of `states`. `rates` writes the latter to `[i][1]` for the former. Returns whether it succeeded.
 ///
-/// A box that holds all that its own rates lead to, x + \[0, dt\] ẋ(box), holds the path (Picard and Lindelöf).
+/// A box that contains x + \[0, dt\] ẋ(box) contains the path (Picard and Lindelöf).
 ///
 /// Source: R. E. Moore, R. B. Kearfott and M. J. Cloud, *Introduction to Interval Analysis*, SIAM (2009), section 10.4.
 #[inline(always)]
@@ -19,7 +19,7 @@ pub fn enclose(
     states: &mut [[Interval; 2]],
     mut rates: impl FnMut(&mut [[Interval; 2]]),
 ) -> bool {
-    /// Part of the way by which a trial is wider at either end.
+    /// Part of its width by which a trial is widened at either end.
     const WIDER: f64 = 0.5;
     for ((state, x), rate) in states.iter_mut().zip(x).zip(rate) {
         state[0] = Interval::new(-WIDER, 1.0 + WIDER) * (rate * dt) + *x;
@@ -43,11 +43,11 @@ pub fn enclose(
     false
 }
 
-/// The greater of two lower bounds on what begins as `h` and has its values from `low` up and its rate in `slope` for `dt` s. By
-/// the mean value theorem, where much of what moves h cancels, the second is.
+/// The greater of two lower bounds on a quantity that begins at `h`, has its values from `low` up and its rate in `slope`
+/// for `dt` s. The second follows from the mean value theorem, and is greater if much of what moves h cancels.
 #[inline(always)]
 pub fn sharper(low: f64, h: f64, slope: Interval, dt: f64) -> f64 {
     let risen = h + dt * slope.low.min(0.0);
-    // NaN is no bound.
+    // NaN is not a bound.
     if risen > low { risen } else { low }
 }

@@ -1,4 +1,4 @@
-//! Derivatives that somebody else computes, such as a simulator: the state is the derivatives themselves.
+//! Derivatives that are computed elsewhere, such as by a simulator: the state consists of the derivatives themselves.
 
 use alloc::boxed::Box;
 
@@ -6,7 +6,7 @@ use super::{Ahead, DerivativeSource, Derivatives, Direction, Directional, checke
 use crate::elementary::dot;
 use crate::error::Error;
 
-/// The state is h, h', …, h⁽ⁿ⁻¹⁾, L_f^n h, L_g L_f^(n−1) h, the last with one number for each input.
+/// The state is h, h', …, h⁽ⁿ⁻¹⁾, L_f^n h, L_g L_f^(n−1) h; the last has one number for each input.
 struct External {
     n: usize,
     inputs: usize,
@@ -49,12 +49,12 @@ impl Directional for External {
     }
 }
 
-/// Derivatives of one barrier of relative degree `n` that are computed elsewhere and passed at every step
-/// in place of a state: its n + 1 + `input_dim` components are h, its derivatives of the orders 1 to n − 1,
-/// L_f^n h (the derivative of order n where all inputs are 0), and L_g L_f^(n−1) h (what one unit of each input
-/// adds to that), in `[h]`/s^k and `[h]`/(s^n · unit of u). Of a time-varying h they are total derivatives.
+/// Derivatives of one barrier of relative degree `n` that are computed elsewhere and passed at every step in place of a
+/// state. Its n + 1 + `input_dim` components are h, its derivatives of the orders 1 to n − 1, L_f^n h (the derivative of
+/// order n if all inputs are 0), and L_g L_f^(n−1) h (what one unit of each input adds to that), in `[h]`/s^k and `[h]`/(s^n
+/// · unit of u). For a time-varying h they are total derivatives.
 ///
-/// They are taken as they are: nobody checks `n`. Nothing can be predicted, so steps are those of
+/// They are used as they are: `n` is not checked. Nothing can be predicted, so steps are those of
 /// [`Sampling::Pointwise`](crate::filter::Sampling::Pointwise), and the margin has to cover held inputs. For several
 /// barriers the filter's state holds one such part after the other; [`embedded`](super::embedded()) picks each.
 ///

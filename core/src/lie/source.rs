@@ -1,4 +1,4 @@
-//! The derivatives of a barrier as the filter asks for them, whoever gives them.
+//! The derivatives of a barrier, as the filter asks for them, from any source.
 
 use alloc::boxed::Box;
 use core::any::Any;
@@ -7,16 +7,16 @@ use super::{Ahead, Derivatives};
 use crate::MAX_RELATIVE_DEGREE;
 use crate::interval::Interval;
 
-/// A supplier of the derivatives of one barrier. [`along`](super::along()) makes one from the traits,
-/// [`external`](super::external()) takes the derivatives from whoever computes them, and a user's own code can be another.
+/// A source of the derivatives of one barrier. [`along`](super::along()) makes one from the traits,
+/// [`external`](super::external()) takes derivatives that are computed elsewhere, and users can implement their own.
 ///
-/// The first four methods are all that a filter needs. The others say what else a source can do:
+/// The first four methods are all that a filter needs. The others return the further abilities of a source:
 ///
 /// | method | for |
 /// |---|---|
 /// | [`predict`](Self::predict) | constraints over the sampling period ([`Sampling`](crate::filter::Sampling)), delayed inputs |
 /// | [`directional`](Self::directional) | [`Filter::differentiate`](crate::filter::Filter::differentiate) |
-/// | [`predict_directional`](Self::predict_directional) | the same over the sampling period, and errors of the measurement |
+/// | [`predict_directional`](Self::predict_directional) | the same over the sampling period, and measurement errors |
 /// | [`highest`](Self::highest) | deadlines that are lost ([`reach`](crate::reach)) |
 /// | [`shared`](Self::shared) | the speed of filters with several barriers along one plant |
 pub trait DerivativeSource: Send {
@@ -32,44 +32,44 @@ pub trait DerivativeSource: Send {
     /// Writes the derivatives at time `t` (s) and state `x` (of [`Self::state_dim`] components).
     fn evaluate(&self, t: f64, x: &[f64], out: &mut Derivatives);
 
-    /// The source as one that knows the plant. The default does not.
+    /// The source as one that knows the plant, if it does. The default does not.
     fn predict(&self) -> Option<&dyn Predict> {
         None
     }
 
-    /// The source as one that differentiates along a direction. The default does not.
+    /// The source as one that differentiates along a direction, if it does. The default does not.
     fn directional(&self) -> Option<&dyn Directional> {
         None
     }
 
-    /// The source as one that differentiates its predictions along a direction. The default does not.
+    /// The source as one that differentiates its predictions along a direction, if it does. The default does not.
     fn predict_directional(&self) -> Option<&dyn PredictDirectional> {
         None
     }
 
-    /// The source as one that others along the same plant can share work with. The default shares none.
+    /// The source as one that shares work with others along the same plant, if it does. The default does not.
     fn shared(&self) -> Option<&dyn SharedPlant> {
         None
     }
 
-    /// A number that h does not exceed between `time[0]` and `time[1]` s after `t` and `x`, under any input
-    /// with `bounds[0]` ≤ u ≤ `bounds[1]`; for [`crate::reach`]. The default knows none.
+    /// An upper bound on h between `time[0]` and `time[1]` s after `t` and `x`, under any input with `bounds[0]` ≤ u ≤
+    /// `bounds[1]`; for [`crate::reach`]. The default knows none.
     fn highest(&self, _t: f64, _x: &[f64], _bounds: [&[f64]; 2], _time: [f64; 2]) -> Option<f64> {
         None
     }
 }
 
-/// What a source with a model of the plant foretells under a held input.
+/// The predictions of a source with a model of the plant, under a held input.
 pub trait Predict {
     /// Moves `x` by `duration` ≥ 0 seconds under the held input `u`.
     fn flow(&self, x: &mut [f64], u: &[f64], duration: f64);
 
-    /// Writes the derivatives of h `duration` ≥ 0 seconds after `t` and `x` under the held input `u`; at time
-    /// `t + duration`.
+    /// Writes the derivatives of h `duration` ≥ 0 seconds after `t` and `x` under the held input `u`, at time `t +
+    /// duration`.
     fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead);
 
-    /// Writes what [`Self::ahead`] does for k < n, which is what a row over the period takes. The other numbers of `out`
-    /// mean nothing.
+    /// Writes what [`Self::ahead`] does for k < n, which is what a row over the period uses. The other numbers of `out` are
+    /// meaningless.
     fn ahead_of_row(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
         self.ahead(t, x, u, duration, out);
     }
@@ -88,7 +88,7 @@ pub trait Predict {
         *out = ahead.value;
     }
 
-    /// Writes what [`Self::values_ahead`] does for k < n, with the same bits. The other numbers of `out` mean nothing.
+    /// Writes what [`Self::values_ahead`] does for k < n, with the same bits. The other numbers of `out` are meaningless.
     fn values_of_row(
         &self,
         t: f64,
@@ -103,25 +103,25 @@ pub trait Predict {
     /// Writes ẋ at `x` under `u`.
     fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]);
 
-    /// Writes the expansion of every state from `x` on under the held input `u`.
+    /// Writes the expansion of every state, starting at `x`, under the held input `u`.
     fn path(&self, x: &[f64], u: &[f64], out: &mut [Expansion]);
 
     /// h at time `t` (s) and state `x`.
     fn value(&self, t: f64, x: &[f64]) -> f64;
 
-    /// Writes the expansion of h along `path`, the expansions of all states from `t` on.
+    /// Writes the expansion of h along `path`, which holds the expansions of all states, starting at `t`.
     fn value_along(&self, t: f64, path: &[Expansion], out: &mut Expansion);
 
-    /// Writes enclosures of the first `orders` coefficients, 1 to [`EXPANSION_ORDERS`] − 1, of ẋ under `u`: as a series in time that
-    /// begins anywhere on a stretch of a path, by those of the expansions of all states that begin there. Says whether it
-    /// did: the default has none, and then what curves the plant's motion between the instants at which it is looked at is
-    /// not seen.
+    /// Writes enclosures of the first `orders` coefficients, 1 to [`EXPANSION_ORDERS`] − 1, of ẋ under `u`: as a series in
+    /// time that begins anywhere on a stretch of a path, from the enclosures of the expansions of all states that begin
+    /// there. Returns whether it did. The default has none; curvature of the plant's motion between the instants at which it
+    /// is evaluated then remains unseen.
     fn rates_over(&self, _path: &[ExpansionOver], _u: &[f64], _orders: usize, _out: &mut [RateOver]) -> bool {
         false
     }
 
-    /// An enclosure of h on such a stretch, at those of the time (s). The default has none: then what curves h between the
-    /// instants at which it is looked at is not seen.
+    /// An enclosure of h on such a stretch, for the enclosed times (s). The default has none; curvature of h between the
+    /// instants at which it is evaluated then remains unseen.
     fn value_over(&self, _time: Interval, _path: &[ExpansionOver]) -> Option<Interval> {
         None
     }
@@ -131,74 +131,75 @@ pub trait Predict {
         None
     }
 
-    /// A number that h does not fall below until `duration` s after `t` and `x` under the held input `u`, narrow things in
-    /// between included; one below `wanted` is as near to the least value as can be had. −∞ where nothing bounds it. The default
-    /// knows none.
+    /// A lower bound on h until `duration` s after `t` and `x` under the held input `u`, including narrow dips in between. A
+    /// bound below `wanted` is as near to the least value as can be had. −∞ if nothing bounds h. The default knows none.
     fn lowest_held(&self, _t: f64, _x: &[f64], _u: &[f64], _duration: f64, _wanted: f64) -> Option<f64> {
         None
     }
 
-    /// Whether h at the state `x` is the same at all times, by its enclosures. The default knows none.
+    /// Whether h at the state `x` is the same at all times, by its enclosures. The default does not know.
     fn is_still(&self, _x: &[f64]) -> Option<bool> {
         None
     }
 
-    /// The least value of h from `t` on while the state stays `x`; for sets that move. The default knows none.
+    /// The least value of h from `t` on while the state remains `x`; for sets that move. The default knows none.
     fn lowest_from(&self, _t: f64, _x: &[f64]) -> Option<f64> {
         None
     }
 }
 
 /// The part of a source's work that depends on the plant alone, so that barriers of one relative degree along one plant need
-/// it once. Whatever is shared, the numbers have the same bits.
+/// it only once. Sharing does not change a bit of the numbers.
 ///
-/// Rooms hold what a method writes for another one. Only sources that [share](Self::shares) a plant know what is in them.
+/// Rooms hold what one method writes for another. Only sources that [share](Self::shares) a plant know their contents.
 pub trait SharedPlant {
     /// The plant.
     fn plant(&self) -> &dyn Any;
 
-    /// Whether `plant`, that of another source of the same relative degree, is this one, so that the rooms of both are alike.
+    /// Whether `plant`, which belongs to another source of the same relative degree, is this one, so that the rooms of both
+    /// are alike.
     fn shares(&self, plant: &dyn Any) -> bool;
 
     /// Rooms for [`Self::motion`] and for [`Self::motion_ahead`].
     fn rooms(&self) -> [Box<dyn Any + Send>; 2];
 
-    /// Writes the motion of the states from `x` on at u = 0, with its derivatives along u.
+    /// Writes the motion of the states from `x` at u = 0, with its derivatives along u.
     fn motion(&self, x: &[f64], room: &mut dyn Any);
 
     /// Writes what [`DerivativeSource::evaluate`] does, from the motion that begins at time `t`.
     fn evaluate_along(&self, t: f64, motion: &dyn Any, out: &mut Derivatives);
 
-    /// Writes the motion that begins `duration` ≥ 0 seconds after `x` under the held input `u`, with its derivatives along u.
+    /// Writes the motion that begins `duration` ≥ 0 seconds after `x` under the held input `u`, with its derivatives along
+    /// u.
     fn motion_ahead(&self, x: &[f64], u: &[f64], duration: f64, room: &mut dyn Any);
 
     /// Writes what [`Predict::ahead_of_row`] does, from the motion ahead, which begins at time `t`.
     fn ahead_of_row_along(&self, t: f64, motion: &dyn Any, out: &mut Ahead);
 }
 
-/// A quantity over time from an instant on: its first Taylor coefficients there, of τ⁰, τ¹ …
+/// A quantity as a function of time since an instant: its first Taylor coefficients there, of τ⁰, τ¹ …
 pub type Expansion = [f64; EXPANSION_ORDERS];
 
-/// What the coefficients of an [`Expansion`] are within, wherever on a stretch of time it begins.
+/// Enclosures of the coefficients of an [`Expansion`] that begins anywhere on a stretch of time.
 pub type ExpansionOver = [Interval; EXPANSION_ORDERS];
 
 /// The same for its rate, which has one coefficient less.
 pub type RateOver = [Interval; EXPANSION_ORDERS - 1];
 
-/// Coefficients of a rate that do for most of the way of a plan, at a fifth of the cost of all.
+/// Number of coefficients of a rate that suffice for most of a plan, at a fifth of the cost of all.
 pub(crate) const FEW_ORDERS: usize = 4;
 
-/// Number of coefficients of an [`Expansion`]. With ten a vehicle that turns by half a radian is resolved to 1e-9.
+/// Number of coefficients of an [`Expansion`]. With ten, a vehicle that turns by half a radian is resolved to 1e-9.
 pub const EXPANSION_ORDERS: usize = 10;
 
 /// The derivatives of h at an instant, differentiated along a direction.
 pub trait Directional {
     /// Writes the derivative along `direction` of h⁽⁰⁾ … h⁽ⁿ⁾ at time `t`, state `x` and input `u`, and of the gradient of
-    /// each by u.
+    /// each with respect to u.
     fn evaluate_directional(&self, t: f64, x: &[f64], u: &[f64], direction: Direction, out: &mut Ahead);
 }
 
-/// What [`Predict`] foretells, differentiated along a direction.
+/// The predictions of [`Predict`], differentiated along a direction.
 pub trait PredictDirectional {
     /// Moves `x` as [`Predict::flow`] does, and the direction `dx` by the derivative of that.
     fn flow_directional(&self, x: &mut [f64], dx: &mut [f64], u: &[f64], duration: f64);
@@ -218,8 +219,8 @@ pub trait PredictDirectional {
 /// The direction of a derivative: how state and input move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Direction<'a> {
-    /// Of the state, as many components.
+    /// The direction of the state, with as many components.
     pub x: &'a [f64],
-    /// Of the input, or of the reference input, as many components.
+    /// The direction of the input, or of the reference input, with as many components.
     pub u: &'a [f64],
 }

@@ -8,21 +8,21 @@ use crate::MAX_INPUTS;
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BackupPlan {
-    /// The end of each hold in s, and its input. The last is held for ever where the plant is at an equilibrium under it.
+    /// The end of each hold in s, and its input. The last is held for ever if the plant is at an equilibrium under it.
     pub inputs: Vec<(f64, [f64; MAX_INPUTS])>,
-    /// The time in s until which every requirement is met: infinite where the plan ends at an equilibrium, else its end.
+    /// The time in s until which every requirement is met: infinite if the plan ends at an equilibrium, otherwise its end.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub until: f64,
-    /// The place on the way where h − margin is least.
+    /// The place along the plan where h − margin is least.
     pub tightest: Option<Tightest>,
-    /// The largest rate of each state on the way, and on the way of the plan before it: what an equilibrium's rates are
-    /// small against. It never falls, so what was an equilibrium stays one.
+    /// The largest rate of each state along the plan, and along the plan before it. The rates at an equilibrium have to be
+    /// small against it. It never falls, so an equilibrium remains one.
     pub(super) rates: Vec<f64>,
-    /// The largest input on the way after the first hold, as a part of its bounds, 0 to 1.
+    /// The largest input along the plan after the first hold, as a part of its bounds, 0 to 1.
     pub effort: f64,
-    /// Whether its holds end at samples in the period of the first.
+    /// Whether its holds end at samples with the period of the first.
     pub(crate) is_uniform: bool,
-    /// The pieces of its walk.
+    /// The number of pieces of its rollout.
     pub(super) pieces: u32,
 }
 
@@ -53,7 +53,7 @@ pub struct Tightest {
     /// Time in s.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub time: f64,
-    /// h − margin in the unit of h, a bound from below.
+    /// A lower bound on h − margin, in the unit of h.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub slack: f64,
 }

@@ -1,4 +1,4 @@
-//! Arithmetic of [`Expansion`]s: polynomials in the time since their begin.
+//! Arithmetic of [`Expansion`]s: polynomials in the time since their start.
 
 use crate::elementary::powf;
 use crate::interval::Interval;
@@ -18,7 +18,7 @@ pub(super) fn slope(expansion: &Expansion, dt: f64) -> f64 {
     (1..EXPANSION_ORDERS).rev().fold(0.0, |sum, k| sum * dt + k as f64 * expansion[k])
 }
 
-/// The same polynomial in the time from `dt` s later on.
+/// The same polynomial in the time since `dt` s after its start.
 pub(super) fn shifted(expansion: &Expansion, dt: f64) -> Expansion {
     let mut c = *expansion;
     for first in 0..DEGREE {
@@ -44,8 +44,8 @@ pub(super) fn reach(expansion: &Expansion, allowed: f64, most: f64) -> f64 {
     most.min(until(DEGREE - 1)).min(until(DEGREE))
 }
 
-/// A number that no value within `dt` s is below: the least coefficient in the basis of Bernstein,
-/// `b_j = Σ_{k ≤ j} C(j, k) / C(n, k) a_k` with a_k = c_k dtᵏ.
+/// A lower bound on the values within `dt` s: the least Bernstein coefficient, `b_j = Σ_{k ≤ j} C(j, k) / C(n, k) a_k` with
+/// a_k = c_k dtᵏ.
 ///
 /// Source: G. Farin, *Curves and Surfaces for CAGD*, section 6.1 (convex hull property).
 pub(super) fn least(expansion: &Expansion, dt: f64) -> f64 {
@@ -61,8 +61,8 @@ pub(super) fn least(expansion: &Expansion, dt: f64) -> f64 {
     (0..EXPANSION_ORDERS).map(coefficient).fold(f64::INFINITY, f64::min)
 }
 
-/// The coefficients of the expansion from anywhere within `dt` s on: each is that of the middle, give or take what the
-/// higher ones change it by within half of `dt`.
+/// The coefficients of the expansion that starts anywhere within `dt` s. Each is that from the middle, give or take the
+/// effect of the higher ones over half of `dt`.
 pub(super) fn over(expansion: &Expansion, dt: f64) -> ExpansionOver {
     let (middle, half) = (shifted(expansion, 0.5 * dt), 0.5 * dt);
     core::array::from_fn(|k| {
@@ -73,11 +73,11 @@ pub(super) fn over(expansion: &Expansion, dt: f64) -> ExpansionOver {
     })
 }
 
-/// The most that the expansion of a state misses its rate by within `dt` s: the coefficients of the one are within
-/// `expansion`, the first of the other within `rate`.
+/// An upper bound on the residual of a state's expansion against its rate within `dt` s. The coefficients of the expansion
+/// are within `expansion`, the first coefficients of the rate within `rate`.
 ///
-/// Their difference r has no coefficients at the begin, so r(τ) = τᵏ r_k(s) at an s in 0 ... τ for every k up to where the rate
-/// is smooth: Taylor's theorem with the remainder of Lagrange. The least of these bounds counts.
+/// Their difference r has zero coefficients at the start. So r(τ) = τᵏ r_k(s) at some s in 0 ... τ, for every k up to which
+/// the rate is smooth, by Taylor's theorem with the Lagrange remainder. The least of these bounds counts.
 pub(super) fn missed(rate: &[Interval], expansion: &ExpansionOver, dt: f64) -> f64 {
     let (mut least, mut power) = (f64::INFINITY, 1.0);
     for (k, rate) in rate.iter().enumerate() {
@@ -124,7 +124,7 @@ mod tests {
 
     #[test]
     fn no_value_is_below_the_least_coefficient() {
-        // All coefficients of (1 - τ)⁹ in the basis of Bernstein on [0, 1] are 0 but the first.
+        // All Bernstein coefficients of (1 - τ)⁹ on [0, 1] are 0 but the first.
         assert!(least(&FALLS, 1.0).abs() < 1e-12);
         let mut wave = [0.0; EXPANSION_ORDERS];
         for seed in 0..200_u64 {
@@ -149,7 +149,7 @@ mod tests {
                 assert!(found.low <= wanted + 1e-11 && wanted <= found.high + 1e-11, "{found:?} {wanted}");
             }
         }
-        // Of a line the bounds are its ends.
+        // The bounds of a line are its ends.
         let line = [3.0, -2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
         assert_eq!(over(&line, 1.0)[0], Interval::new(1.0, 3.0));
     }

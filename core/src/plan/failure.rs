@@ -1,9 +1,9 @@
-//! Why there is no plan, and that in words.
+//! Why there is no plan, and the message that says so.
 
 use alloc::string::{String, ToString};
 use core::fmt;
 
-/// What keeps a list of inputs from being a backup plan.
+/// Why a list of inputs is not a backup plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -15,46 +15,48 @@ pub enum Failure {
         /// Time in s.
         #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
         time: f64,
-        /// h there, less what has to be kept of it, < 0.
+        /// h there, less the least value that has to be kept, < 0.
         #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
         slack: f64,
     },
     /// The plant does not reach an equilibrium, or a set moves.
     NoRest,
-    /// A deviation that nobody could measure grows on the way until the plan is lost.
+    /// A deviation too small to measure grows along the plan until the plan is lost.
     Unsteady,
-    /// Nothing is promised that could be kept.
+    /// There is no promise to keep.
     Nothing,
-    /// The model is not finite on the way.
+    /// The model is not finite along the plan.
     Singular,
-    /// There are too many samples, or steps of the model, to look at.
+    /// There are too many samples, or steps of the model, to check.
     TooLong,
-    /// The plant was seen to differ from the model, and by as much again a requirement may not be met before the next sample.
+    /// The plant was seen to deviate from the model. With 1.5 times that deviation, a requirement may not be met before the
+    /// next sample.
     Drift {
         /// The number of its barrier.
         barrier: usize,
         /// Time in s.
         #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
         time: f64,
-        /// h there in the model, less what it may fall by beside it, < 0.
+        /// h there in the model, less what it may fall by because of the deviation, < 0.
         #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
         slack: f64,
     },
-    /// Two requirements are in force at the same time, and no state meets both: no plan can be there.
+    /// Two requirements are in force at the same time, and no state meets both: there can be no plan.
     Apart {
         /// The numbers of their barriers.
         barriers: [usize; 2],
-        /// Whether the first one has a deadline that is still to come, but contained the state, so that it is kept from there on.
+        /// Whether the first one has a deadline still to come, but its set contained the state, so that it has to be kept
+        /// from there on.
         contained: bool,
     },
-    /// A requirement began while no plan was followed, so nobody saw whether it was met.
+    /// A requirement began while no plan was followed, so it is not known whether it was met.
     Missed {
         /// The number of its barrier.
         barrier: usize,
     },
 }
 
-/// What the words of a [`Failure`] name, which knows of barriers only by their numbers.
+/// The names in the message of a [`Failure`], which itself knows barriers only by their numbers.
 pub trait Names {
     /// The name of a barrier.
     fn barrier(&self, barrier: usize) -> String {
@@ -71,7 +73,7 @@ pub trait Names {
         time.to_string()
     }
 
-    /// That no state meets two barriers.
+    /// The statement that no state meets two barriers.
     fn apart(&self, barriers: [usize; 2]) -> String {
         let [first, second] = barriers.map(|barrier| self.barrier(barrier));
         format!("no state is in both {first} and {second}")
@@ -84,13 +86,13 @@ struct Numbers;
 impl Names for Numbers {}
 
 impl Failure {
-    /// It in words, with the names of `names`.
+    /// The message, with the names from `names`.
     pub fn named(self, names: &dyn Names) -> impl fmt::Display {
         Named { failure: self, names }
     }
 }
 
-/// A failure with names for what is in it.
+/// A failure with names for its contents.
 struct Named<'a> {
     failure: Failure,
     names: &'a dyn Names,

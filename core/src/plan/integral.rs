@@ -1,9 +1,9 @@
-//! Plans behind an integrator: the plant is given the mean of an integral over each period.
+//! Plans behind an integrator: the plant receives the mean of an integral over each period.
 
 use crate::interval::Interval;
 use crate::lie::{Ahead, EXPANSION_ORDERS, Expansion, ExpansionOver, Predict, RateOver};
 
-/// A state that is the integral of an input, and of which the plant is given the mean over each period, held.
+/// A state that is the integral of an input. The plant receives its mean over each period, held.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Integral {
     /// The number of the state.

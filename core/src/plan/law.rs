@@ -1,4 +1,4 @@
-//! Two laws of feedback: one stops the plant, the other follows a reference.
+//! Two feedback laws: one stops the plant, the other follows a reference.
 
 use alloc::vec::Vec;
 
@@ -8,15 +8,15 @@ use super::model::{Linear, Model, largest_eigenvalue};
 use crate::elementary;
 use crate::scalar::all_finite;
 
-/// Price of an input against what one hold of it gains: near 0 the plant is stopped in as few holds as it can be.
+/// Price of an input, in units of what one hold of it gains. Near 0 the plant is stopped in as few holds as possible.
 const GENTLENESS: f64 = 0.3;
-/// Steps of the Riccati equation until it counts as settled.
+/// Largest number of steps of the Riccati equation until it counts as settled.
 const RICCATI: u32 = 2000;
 
-/// u = `input` + `gain` (x − `state`), moved into the bounds: stops the plant, wherever that is.
+/// u = `input` + `gain` (x − `state`), clamped to the bounds: stops the plant, wherever it is.
 ///
-/// The gain is that of the linear-quadratic regulator at the equilibrium, with the price ‖ẋ‖². So it asks for no place, only
-/// that nothing moves: a vehicle is braked where it is, a pendulum is held upright.
+/// The gain is that of the linear-quadratic regulator at the equilibrium, with the price ‖ẋ‖². So it does not ask for a
+/// position, only that nothing moves: a vehicle is braked where it is, a pendulum is held upright.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct StoppingController {
@@ -29,33 +29,32 @@ pub(super) struct StoppingController {
     growth: f64,
 }
 
-/// Largest eigenvalue over a hold of an equilibrium that stays: round-off of a multiple one.
+/// Largest eigenvalue over a hold at which an equilibrium counts as staying: 1, and round-off of a multiple eigenvalue.
 const STAYS: f64 = 1.0 + 1e-4;
-/// Least part of a deviation that moves over a hold, against the largest, beside an equilibrium that has no other beside it.
+/// Smallest relative to largest part of a deviation that moves over a hold, above which an equilibrium counts as isolated.
 const SOLE: f64 = 1e-6;
-/// Growth of a deviation from an equilibrium over the longest hold that holds it there.
+/// Growth of a deviation from an equilibrium over the longest hold that still stabilises it.
 const LOST: f64 = 1.35;
-/// How fast an equilibrium that does not stay is come to, against how fast it is lost.
+/// How fast the law approaches an equilibrium that does not stay, relative to how fast the plant leaves it (an exponent).
 const HASTE: f64 = 0.6;
-/// Largest part of a state by which another one moves over a hold that is round-off of a difference.
+/// Largest movement of one state over a hold, as a part of another state, that is round-off of a difference.
 const STILL: f64 = 1e-8;
 
 impl StoppingController {
-    /// The law around the equilibrium near `x`, with inputs held for `hold` s. `None` where no equilibrium or no law is
-    /// found.
+    /// The law around the equilibrium near `x`, with inputs held for `hold` s. `None` if no equilibrium or no law is found.
     pub(super) fn around(model: &Model<'_>, x: &[f64], hold: f64) -> Option<Self> {
         let (state, input) = model.equilibrium(x)?;
         Self::at(model, state, input, hold)
     }
 
-    /// The law around the equilibrium near `x` and the input `u`, as [`Self::around`].
+    /// The law around the equilibrium near `x` and the input `u`, as for [`Self::around`].
     pub(super) fn beside(model: &Model<'_>, x: &[f64], u: &[f64], hold: f64) -> Option<Self> {
         let (state, input) = model.equilibrium_from(x, u.to_vec())?;
         Self::at(model, state, input, hold)
     }
 
-    /// The law that leads from `x` to the equilibrium at `state` under `input`: it asks for the place too, as a reference
-    /// does.
+    /// The law that leads from `x` to the equilibrium at `state` under `input`. Like a reference, it asks for the position
+    /// too.
     pub(super) fn to(
         model: &Model<'_>,
         x: &[f64],
@@ -68,7 +67,7 @@ impl StoppingController {
         growth.is_finite().then_some(Self { state, input, gain: Gain::from(&gain), hold, growth })
     }
 
-    /// The same law with shorter holds where the equilibrium is lost sooner; they are so many times `period`.
+    /// The same law with shorter holds, multiples of `period`, if the plant leaves the equilibrium sooner.
     pub(super) fn shorter(&self, model: &Model<'_>, period: f64) -> Option<Self> {
         let hold = (self.longest(LOST) / period) as u32;
         let hold = f64::from(hold.max(1)) * period;
@@ -83,7 +82,7 @@ impl StoppingController {
         self.growth <= STAYS
     }
 
-    /// Whether the plant has other equilibria beside this one under the same input, as a vehicle does, and a motor not.
+    /// Whether the plant has other equilibria near this one under the same input: a vehicle does, a motor does not.
     pub(super) fn is_one_of_many(&self, model: &Model<'_>) -> bool {
         let Linear { a, .. } = model.linear(&self.state, &self.input, self.hold);
         let moved = &a - DMatrix::identity(a.nrows(), a.ncols());
@@ -91,7 +90,7 @@ impl StoppingController {
         sizes.min() <= SOLE * sizes.max()
     }
 
-    /// The time in s in which a deviation from the equilibrium grows so many times; at most a hold.
+    /// The time in s in which a deviation from the equilibrium grows by the factor `growth`; at most a hold.
     pub(super) fn longest(&self, growth: f64) -> f64 {
         self.hold * (elementary::ln(growth) / elementary::ln(self.growth.max(growth)))
     }
@@ -103,25 +102,24 @@ impl StoppingController {
             return None;
         }
         let nx = a.nrows();
-        // What is round-off of a difference moves nothing.
+        // Round-off of a difference moves nothing.
         let moved = (&a - DMatrix::identity(nx, nx)).map(|v| if v.abs() > STILL { v } else { 0.0 });
         let rate = moved / hold;
         let q = rate.transpose() * rate;
         let gained = b.transpose() * &q * &b;
-        // An input that moves nothing at once, such as one behind an integrator, is priced like the others.
-        // Where every state is an equilibrium, as of a point moved by its velocity, nothing is gained, and nothing is
-        // braked.
+        // An input without an immediate effect, such as one behind an integrator, is priced like the others. If every state
+        // is an equilibrium, as for a point moved by its velocity, nothing is gained, and nothing is braked.
         let reach = b.column_iter().fold(0.0, |m: f64, column| m.max(column.norm_squared()));
         let most = gained.diagonal().max().max(1e-12 * reach / square(hold)).max(f64::MIN_POSITIVE);
         let r = DMatrix::from_diagonal(&gained.diagonal().map(|g| GENTLENESS * g.max(1e-3 * most)));
-        // What no input hastens is left as it is.
+        // Whatever no input can speed up is left as it is.
         let sooner = if growth <= STAYS { 1.0 } else { elementary::powf(growth.min(LOST), HASTE) };
         let hastened = regulator(&(&a * sooner), &(&b * sooner), &q, &r);
         let gain = hastened.or_else(|| regulator(&a, &b, &q, &r))?;
         Some(Self { state, input, gain: Gain::from(&gain), hold, growth })
     }
 
-    /// Whether it is a law of a plant with so many states and inputs.
+    /// Whether it is a law for a plant with `states` states and `inputs` inputs.
     pub(super) fn fits(&self, states: usize, inputs: usize) -> bool {
         let Self { state, input, gain, hold, growth } = self;
         is_of(state, states)
@@ -152,7 +150,7 @@ pub(super) struct Reference {
 }
 
 impl Reference {
-    /// Whether it is one of a plant with so many states and inputs.
+    /// Whether it belongs to a plant with `states` states and `inputs` inputs.
     pub(super) fn fits(&self, states: usize, inputs: usize) -> bool {
         let Self { times, inputs: held, states: nodes, gains } = self;
         is_of(times, held.len() + 1)
@@ -169,7 +167,7 @@ impl Reference {
         Self { times: self.times.iter().map(|t| t - by).collect(), ..self.clone() }
     }
 
-    /// The time at which it comes nearest to `x`: each state measured by its span.
+    /// The time at which it comes nearest to `x`, with each state measured in units of its span.
     pub(super) fn nearest(&self, x: &[f64]) -> f64 {
         let span = |i: usize| {
             let (low, high) = self
@@ -224,7 +222,7 @@ impl Reference {
     }
 }
 
-/// A matrix, row by row: one for each input.
+/// A matrix, stored by rows: one row for each input.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Gain(Vec<f64>);
@@ -244,8 +242,8 @@ impl Gain {
         }
     }
 
-    /// The gains of a feedback along `states` and `inputs`, beside which the plant is `linear`: by the Riccati equation,
-    /// backwards. `None` where there are none.
+    /// The gains of a feedback along `states` and `inputs`, near which the plant is `linear`: by the Riccati equation,
+    /// backwards. `None` if there are none.
     pub(super) fn along(
         model: &Model<'_>,
         states: &[Vec<f64>],
@@ -265,7 +263,7 @@ impl Gain {
     }
 }
 
-/// The prices of a deviation and of an input along `states` and `inputs`: a deviation is priced by how far its state moves
+/// The prices of a deviation and of an input along `states` and `inputs`. A deviation is priced by how far its state moves
 /// there, an input by its bounds.
 fn prices(
     model: &Model<'_>,
@@ -289,7 +287,7 @@ fn prices(
     (q, r)
 }
 
-/// The gain that is best in the long run, where the Riccati equation settles.
+/// The gain of the infinite-horizon regulator, for which the Riccati equation settles.
 fn regulator(a: &DMatrix<f64>, b: &DMatrix<f64>, q: &DMatrix<f64>, r: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let mut p = q.clone();
     for _ in 0..RICCATI {
@@ -306,7 +304,7 @@ fn regulator(a: &DMatrix<f64>, b: &DMatrix<f64>, q: &DMatrix<f64>, r: &DMatrix<f
     riccati(&p, a, b, q, r).map(|(_, gain)| gain)
 }
 
-/// One step of the Riccati equation backwards: the price of a state before it, and the gain.
+/// One step of the Riccati equation backwards: the price of the state before it, and the gain.
 fn riccati(
     p: &DMatrix<f64>,
     a: &DMatrix<f64>,
@@ -317,12 +315,12 @@ fn riccati(
     let pb = p * b;
     let gain = -((r + b.transpose() * &pb).cholesky()?.solve(&(pb.transpose() * a)));
     let next = q + a.transpose() * p * (a + b * &gain);
-    // Symmetric but for round-off, which would grow.
+    // Symmetric up to round-off, which would grow.
     let next = (&next + next.transpose()) * 0.5;
     Some((next, gain))
 }
 
-/// Whether these are so many numbers, all finite.
+/// Whether these are `count` numbers, all finite.
 fn is_of(numbers: &[f64], count: usize) -> bool {
     numbers.len() == count && all_finite(numbers)
 }

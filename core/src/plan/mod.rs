@@ -1,24 +1,24 @@
-//! Plans: a verified way to keep every promise, from a state on, within the bounds of the inputs.
+//! Plans: a verified way to keep every promise, starting from a state, within the bounds of the inputs.
 //!
-//! A *plan* is a list of held inputs and a law that holds the plant at an equilibrium after them. It is a *backup plan* of
-//! the promise: run ahead in the model, it meets every requirement at all times. A filter that applies at every sample
-//! either an input with a new backup plan behind it, or the next input of the backup plan it has, keeps every requirement
-//! for ever. The lemma and its proof are in `docs/theory.md#backup-plan`. Where there is no equilibrium, or a set moves, a
-//! plan may end at a [horizon](crate::filter::Plans::horizon): the requirements are kept until then.
+//! A *plan* is a list of held inputs, and a law that holds the plant at an equilibrium after them. It is a *backup plan* for
+//! the promise if, run ahead in the model, it meets every requirement at all times. At every sample the filter applies
+//! either an input with a new backup plan behind it, or the next input of its current backup plan. It then keeps every
+//! requirement for ever. The lemma and its proof are in `docs/theory.md#backup-plan`. Where there is no equilibrium, or a
+//! set moves, a plan may end at a [horizon](crate::filter::Plans::horizon): the requirements are kept until then.
 //!
 //! | module | owns |
 //! |---|---|
 //! | `model` | the plant run ahead, its linearisation by differences, the equilibrium near a state |
 //! | `law` | feedback that stops the plant, and feedback that follows a reference |
 //! | `backup_plan`, `failure` | a verified list of inputs; why there is none |
-//! | `check` | the exact check: a roll-out that meets every requirement, between its nodes too |
-//! | `expansion` | polynomials in time, and what they do not fall below |
-//! | `failure` | why there is no plan, in words |
+//! | `check` | the exact check: a rollout that meets every requirement, between its nodes too |
+//! | `expansion` | polynomials in time, and their lower bounds |
+//! | `failure` | messages that say why there is no plan |
 //! | `integral` | the mean of an integral over each period, and its limits |
 //! | `search` | reference trajectories by sequential convex programming |
 //! | `planner` | which trials are made, in which order, and what is kept between samples |
 //!
-//! The search is heuristic and may fail. The check does not depend on it: a promise depends on the check alone.
+//! The search is heuristic and may fail. The check does not depend on it, and a promise depends on the check alone.
 
 mod backup_plan;
 mod check;
@@ -47,27 +47,28 @@ use law::{Reference, StoppingController};
 /// What a plan has to keep: h(t, x(t)) ≥ `margin` for `from` ≤ t < `until`.
 #[derive(Clone, Copy)]
 pub(crate) struct Requirement<'a> {
-    /// The number of its barrier, to name it by.
+    /// The number of its barrier, used in messages.
     pub(crate) barrier: usize,
-    /// Whether it is one of the limits of an integral, which come after the barriers and may be reached.
+    /// Whether it is one of the limits of an integral, which are numbered after the barriers and may be reached.
     pub(crate) is_limit: bool,
-    /// The barrier along the plant, run ahead.
+    /// The barrier along the plant, for prediction.
     pub(crate) model: &'a dyn Predict,
     /// First time in s.
     pub(crate) from: f64,
     /// Last time in s; infinite for ever.
     pub(crate) until: f64,
-    /// Least value in the unit of h, ≥ 0; of a limit that is kept a part of its last digit below 0.
+    /// Least value in the unit of h, ≥ 0. At a limit that is kept it lies below 0 by a part of the limit's last digit.
     pub(crate) margin: f64,
-    /// From when in s it has to be there: what begins at the edge has some time to leave it.
+    /// From when in s the margin has to be there: a state that begins at the edge of a set has some time to leave the edge.
     pub(crate) firm: f64,
-    /// Least value that a new plan keeps, in the unit of h, ≥ 0: what is more than the margin is a reserve for a plant that is
-    /// not quite the model. The remainder of a plan may use it up.
+    /// Least value that a new plan keeps, in the unit of h, ≥ 0. What exceeds the margin is a reserve for a plant that
+    /// deviates from the model. The remainder of a plan may use it up.
     pub(crate) reserve: f64,
 }
 
-/// A law that may keep what is asked for, such as a custom controller: it writes the input at a time in s and a state.
-/// A search for a plan begins with where it leads too. No guarantee depends on it, since every plan is checked.
+/// A law that may keep what is required, such as a custom controller. It writes the input at a time in s and a state. A
+/// search for a plan also begins from the trajectory to which it leads. No guarantee depends on it, since every plan is
+/// checked.
 pub type Policy = Box<dyn Fn(f64, &[f64], &mut [f64]) + Send>;
 
 impl Requirement<'_> {
@@ -102,7 +103,7 @@ impl Plan {
         self.stopping.is_none()
     }
 
-    /// What is wrong with it as a plan of a plant with so many states and inputs; one from a file may be.
+    /// Its flaw as a plan for a plant with `states` states and `inputs` inputs, if any. A plan from a file may have one.
     pub(crate) fn flaw(&self, [states, inputs]: [usize; 2]) -> Option<&'static str> {
         let is_flawed = self.stopping.as_ref().is_some_and(|stopping| !stopping.fits(states, inputs))
             || self.reference.as_ref().is_some_and(|reference| !reference.fits(states, inputs))

@@ -1,4 +1,4 @@
-//! The plant of a plan, run ahead in steps of bounded length.
+//! The plant of a plan, predicted in steps of bounded length.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -11,28 +11,28 @@ use crate::elementary;
 use crate::lie::Predict;
 use crate::qp::Bounds;
 
-/// Part of a state's size by which it is moved to differentiate.
+/// Perturbation of a state for differentiation, as a part of its size.
 const DIFFERENCE: f64 = 1e-6;
-/// Most Gauss-Newton steps to an equilibrium.
+/// Largest number of Gauss-Newton steps to an equilibrium.
 const TO_EQUILIBRIUM: u32 = 30;
-/// Most steps of an eigenvalue decomposition: it takes a few for each state.
+/// Largest number of steps of an eigenvalue decomposition: it takes a few for each state.
 const MOST_ROTATIONS: usize = 1000;
 /// Least singular value that counts, as a part of the largest.
 const RANK: f64 = 1e-9;
 
-/// The plant, and the longest step in s in which it is run ahead.
+/// The plant, and the longest step in s of its prediction.
 #[derive(Clone, Copy)]
 pub(super) struct Model<'a> {
     pub(super) plant: &'a dyn Predict,
     /// Number of states, and of inputs.
     pub(super) dims: [usize; 2],
     pub(super) bounds: &'a Bounds,
-    /// What the plant is given the mean of over each period.
+    /// The integral whose mean the plant receives over each period.
     pub(super) integral: Option<Integral>,
     pub(super) step: f64,
 }
 
-/// x⁺ ≈ A δx + B δu beside a state and an input.
+/// x⁺ ≈ A δx + B δu near a state and an input.
 pub(super) struct Linear {
     pub(super) a: DMatrix<f64>,
     pub(super) b: DMatrix<f64>,
@@ -49,7 +49,7 @@ impl Model<'_> {
 
     /// Number of equal steps of at most [`Self::step`] in `duration`.
     pub(super) fn steps(&self, duration: f64) -> usize {
-        // Round-off of a sum of steps is no further step.
+        // Round-off of a sum of steps does not add a step.
         ((duration / self.step * (1.0 - 1e-9)) as usize).saturating_add(1)
     }
 
@@ -68,13 +68,13 @@ impl Model<'_> {
         }
     }
 
-    /// Half the width of the bounds of input `i`, or `otherwise` where there is one missing.
+    /// Half the width of the bounds of input `i`, or `otherwise` if a bound is missing.
     pub(super) fn reach(&self, i: usize, otherwise: f64) -> f64 {
         let half = (self.bounds.max[i] - self.bounds.min[i]) / 2.0;
         if half.is_finite() { half } else { otherwise }
     }
 
-    /// The linear model over `duration` s beside `x` and `u`, by central differences.
+    /// The linear model over `duration` s near `x` and `u`, by central differences.
     pub(super) fn linear(&self, x: &[f64], u: &[f64], duration: f64) -> Linear {
         let nx = x.len();
         let both = differences(&[x, u].concat(), DIFFERENCE, nx, |end| {
@@ -91,26 +91,26 @@ impl Model<'_> {
         DVector::from_iterator(x.len(), end.iter().zip(x).map(|(e, x)| (e - x) / duration))
     }
 
-    /// A state near `x` and an input within the bounds that holds it there for a step: least change by Gauss-Newton steps.
-    /// `None` where none is found.
+    /// A state near `x`, and an input within the bounds that holds it there for a step, by Gauss-Newton steps of least
+    /// change. `None` if none is found.
     pub(super) fn equilibrium(&self, x: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
         let mut u = vec![0.0; self.inputs()];
         self.clamp(&mut u);
         self.equilibrium_from(x, u).or_else(|| {
-            // Without an input a tank may run empty meanwhile.
+            // Without an input a tank may run empty during the search.
             let middle = |i: usize| (self.bounds.min[i] + self.bounds.max[i]) / 2.0;
             let middle = (0..self.inputs()).map(middle).map(|u| if u.is_finite() { u } else { 0.0 });
             self.equilibrium_from(x, middle.collect())
         })
     }
 
-    /// That equilibrium, sought from the input `u` on.
+    /// The same equilibrium, sought from the input `u`.
     pub(super) fn equilibrium_from(&self, x: &[f64], u: Vec<f64>) -> Option<(Vec<f64>, Vec<f64>)> {
         self.equilibrium_within(x, u, |_, _| {})
     }
 
-    /// The same within sets: `missing` tells at a state of each set that it is outside of how much h lacks there, > 0, over
-    /// the length of its gradient, and that gradient over its length.
+    /// The same within sets. `missing` appends two numbers for each set that does not contain a state: by how much h falls
+    /// short there, > 0, divided by the length of its gradient; and the unit gradient.
     pub(super) fn equilibrium_within(
         &self,
         x: &[f64],
@@ -139,11 +139,11 @@ impl Model<'_> {
             for (i, (_, gradient)) in outside.iter().enumerate() {
                 jacobian.view_mut((nx + i, 0), (1, nx)).copy_from_slice(gradient);
             }
-            // Of what is no number the decomposition need not end.
+            // A decomposition of NaN need not end.
             if !jacobian.iter().all(|v| v.is_finite()) {
                 return None;
             }
-            // An input that its bounds stop leaves the remainder of the way to the state.
+            // If a bound stops an input, the state covers the rest.
             let mut stopped = vec![false; nu];
             let step = loop {
                 let svd = jacobian.clone().svd(true, true);
@@ -184,8 +184,8 @@ pub(crate) fn slopes(h: &dyn Predict, t: f64, x: &[f64], out: &mut [f64]) {
     }
 }
 
-/// The slopes of the first `rows` numbers that `map` makes of those in `at`, one column for each of these: central differences,
-/// each of `part` of its size.
+/// The derivatives of the first `rows` numbers that `map` computes from `at`, one column for each number in `at`: by central
+/// differences, each over `part` of its size.
 pub(super) fn differences(
     at: &[f64],
     part: f64,
@@ -207,9 +207,9 @@ pub(super) fn differences(
     slopes
 }
 
-/// The size of the largest eigenvalue. Infinite where there is none to be found.
+/// The size of the largest eigenvalue; infinite if none is found.
 pub(super) fn largest_eigenvalue(matrix: &DMatrix<f64>) -> f64 {
-    // Of what is no number the decomposition need not end.
+    // A decomposition of NaN need not end.
     let schur = match matrix.iter().all(|v| v.is_finite()) {
         true => Schur::try_new(matrix.clone(), f64::EPSILON, MOST_ROTATIONS),
         false => None,

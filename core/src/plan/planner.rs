@@ -17,70 +17,78 @@ use crate::{MAX_INPUTS, elementary};
 
 pub(crate) use renewal::SearchProgress;
 
-/// Grids: the part of the time until each deadline after which its set is already asked for in the search, and the number of
-/// holds until the last deadline and after it. First for a plant that stops soon, then for one that does not, then for
-/// deadlines that leave much time, where long holds are too coarse. Last, where there is a deadline, for one that takes many
-/// times as long as that to reach an equilibrium.
+/// Grids, in order. Each has the part of the time until each deadline after which the search already requires its set, and
+/// the number of holds until the last deadline and after it. The first is for a plant that stops soon, the second for one
+/// that does not, the third for deadlines that leave much time, for which long holds are too coarse.
 const GRIDS: [(f64, [usize; 2]); 3] = [(1.0, [32, 12]), (1.0, [16, 28]), (0.35, [32, 12])];
+/// The last grid, if there is a deadline: for a plant that takes many times as long as that to reach an equilibrium.
 const SLOW: (f64, [usize; 2]) = (1.0, [4, 40]);
-/// The periods of a hold where there is no deadline; and then, since how long a plant takes to stop has nothing to do with the
-/// period, those of longer ones on the first grid.
+/// The length of a hold in periods if there is no deadline.
 const UNDATED: usize = 5;
+/// Longer holds in periods, on the first grid, if there is no deadline: how long a plant takes to stop does not depend on
+/// the period.
 const LONGER: [usize; 2] = [40, 320];
-/// The number of guesses that go on, the nearest ones, and the quadratic programs for each of them.
+/// Rounds of a search: the number of guesses that continue, nearest first, and the quadratic programs for each of them.
 const ROUNDS: [(usize, u32); 3] = [(12, 2), (5, 6), (3, 12)];
-/// The same for guesses that lead to an equilibrium within the sets: mostly one of them is a plan as it is.
+/// The same for guesses that lead to an equilibrium within the sets: usually one of them is a plan as it is.
 const AIMED: &[(usize, u32)] = &[(2, 2), (2, 6)];
-/// The same for guesses beside a plan that was found.
+/// The number of grids for guesses near a plan that was found.
 const BESIDE_GRIDS: usize = 2;
+/// The rounds for these guesses.
 const BESIDE: &[(usize, u32)] = &[(3, 4), (2, 20)];
-/// Violation, in parts of the size of h, at which a trajectory is worth the exact check.
+/// Largest violation at which a trajectory is worth the exact check, as a part of the size of h.
 const WORTH: f64 = 0.01;
-/// Margins in the search, in units of those of the check, so that its answer passes.
+/// Margins in the search, in units of those of the check, so that the answer passes the check.
 const SEARCHED: f64 = 3.0;
-/// Margins for the remainder of a plan that was checked before: the model differs from the plant by round-off at least.
+/// Margins for the remainder of a plan that was checked before, in the same unit: the plant deviates from the model by
+/// round-off at least.
 const KEPT: f64 = 0.5;
-/// Margins for another input where the next sample may come at any time: what is left is for the plan to move by.
+/// Margins for another input if the next sample may come at any time, in the same unit: the rest is room for the plan to
+/// move.
 const WARY: f64 = 4.0;
-/// Margins for a plan that is followed though it is lost: a hundredth of |h| at the first sample is missing at most.
+/// Margins for a plan that is followed though it is lost, in the same unit: h may fall short by a hundredth of |h| at the
+/// first sample at most.
 const NEARLY: f64 = -100.0;
-/// Margin of a limit of an integral in the search, as a part of the way to it at the start.
+/// Margin at a limit of an integral in the search, as a part of the distance to it at the start.
 const ROOM: f64 = 1e-3;
-/// The most pieces of a walk between samples, if it is more so many times those of the current plan.
+/// Largest number of pieces of a rollout between samples, or, if that is more, as a multiple of those of the current plan.
 const HURRIED: [u32; 2] = [1000, 4];
-/// Checks of a trajectory, each after the first with more margin; those on end that may miss hardly less than the one before, which
-/// is this part of it; and the quadratic programs between them.
+/// Largest number of checks of a trajectory, each after the first with more margin.
 const TIGHTENED: u32 = 12;
+/// Largest number of consecutive checks whose shortfall hardly decreases.
 const STUCK: u32 = 3;
+/// A shortfall hardly decreases if it stays above this part of the least one so far.
 const LESS: f64 = 0.7;
+/// The number of quadratic programs between two checks.
 const TIGHTENING: u32 = 4;
 /// Error of the model over a hold, as a part of the size of a state: in the search, and in the check.
 const RESOLVED: [f64; 2] = [1e-5, 1e-8];
-/// The longest step of the model, in sampling periods; or as a part of a hold, where periods are shorter.
+/// The longest step of the model, in sampling periods.
 const COARSE: f64 = 4.0;
+/// The number of steps in a hold with the longest step of the model, if that step is longer than [`COARSE`] periods.
 const FINE: f64 = 32.0;
 /// The number of samples in a usual period above which a plan has longer holds.
 const FREQUENT: f64 = 4.0;
-/// The most samples until a deadline.
+/// Largest number of samples until a deadline.
 const MOST_SAMPLES: usize = 100_000_000;
-/// Growth of a deviation over a hold of the search, and how much finer its grid is made for that.
+/// Growth of a deviation over a hold of the search above which its grid is refined.
 const LED: f64 = 1.8;
+/// Largest refinement of that grid.
 const FINEST: usize = 3;
 /// Halvings of the model's step until it is resolved.
 const HALVINGS: u32 = 7;
-/// The most inputs of a policy over a hold of the search, which has the mean of them.
+/// Largest number of evaluations of a policy over a hold of the search, which uses their mean.
 const ASKED: f64 = 16.0;
-/// Inputs of first guesses, as a part of their bounds, and the parts of the time for which they are held.
+/// First guesses: inputs as a part of their bounds, and the part of the time for which they are held.
 const GUESSES: [[f64; 2]; 4] = [[0.4, 0.35], [0.6, 0.1], [0.5, 0.0], [1.0, 0.6]];
-/// What is gone for, of how deep inside a set it has to be: round-off is not missing then.
+/// The depth inside a set that the equilibrium aims at, in units of the required depth, so that round-off does not miss it.
 const BEYOND: f64 = 1.5;
-/// How many times as deep inside the sets an equilibrium is sought as the one before, and how often.
+/// How many times as deep inside the sets as the last one the next equilibrium is sought, and how often.
 const DEEPER: (f64, usize) = (4.0, 10);
 /// How far a plan without an equilibrium is sought, in units of how far it has to reach: the next search is that much later.
 const AMPLE: f64 = 1.5;
 
-/// What a first guess does where nothing else is wanted: the plant is stopped, or where there is no equilibrium the input
-/// nearest to 0 is held.
+/// What a first guess does by default: stop the plant, or, if there is no equilibrium, hold the input nearest to 0.
 struct Guide(Option<StoppingController>);
 
 impl Guide {
@@ -107,7 +115,7 @@ impl Guide {
     }
 }
 
-/// How plans come to their end: at an equilibrium under a law, where there is one.
+/// How plans end: at an equilibrium under a law, if there is one.
 struct Ending<'a> {
     model: Model<'a>,
     /// The length of a hold of the search in s.
@@ -138,24 +146,25 @@ pub(crate) struct Planner<'a> {
     usual: f64,
     /// The size of an input that has no bounds.
     size: f64,
-    /// Whether samples come as those before did.
+    /// Whether samples come at the same intervals as before.
     regular: bool,
-    /// Whether a trial may not take much longer than the current plan, and the quadratic programs of a search that goes on
-    /// at the next sample.
+    /// Whether a trial may not take much longer than the current plan.
     hurried: bool,
+    /// The quadratic programs of a search that continues at the next sample.
     programs: u32,
     integral: Option<Integral>,
     policies: &'a [Policy],
-    /// How long in s a plan has to be without an equilibrium at its end, where it may be; and a plan that one goes on from.
+    /// How long in s a plan without an equilibrium at its end has to be, if it is allowed.
     horizon: Option<f64>,
+    /// An earlier plan that the new one continues.
     before: Option<&'a BackupPlan>,
-    /// A plan for other deadlines with which alone a search begins, and how many times as long these are.
+    /// A plan for other deadlines from which alone a search begins, and the factor from its deadlines to these.
     beside: Option<(&'a Plan, f64)>,
 }
 
 impl<'a> Planner<'a> {
-    /// A planner for `plant`, which has as many states and inputs as `dims` says, and whose inputs are within `bounds` and
-    /// held for `period` s; `size` > 0 is the size of an input that has no bounds, in its unit.
+    /// A planner for `plant`, which has as many states and inputs as `dims` says. Its inputs are within `bounds` and held
+    /// for `period` s; `size` > 0 is the size of an input without bounds, in its unit.
     pub(crate) fn new(
         plant: &'a dyn Predict,
         dims: [usize; 2],
@@ -183,52 +192,52 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// The same planner at a sample that did not come as those before did, or is held for another time.
+    /// The same planner at a sample that did not come at the usual interval, or is held for another time.
     #[must_use]
     pub(crate) fn irregular(self, irregular: bool) -> Self {
         Self { regular: !irregular, ..self }
     }
 
-    /// The same planner between samples: a walk behind another input is given up where it takes many more pieces than the
-    /// current plan, and a search goes on at the next sample after so many quadratic programs.
+    /// The same planner between samples. A rollout behind another input is given up if it takes many more pieces than the
+    /// current plan, and a search continues at the next sample after `programs` quadratic programs.
     #[must_use]
     pub(crate) fn hurried(self, programs: u32) -> Self {
         Self { hurried: true, programs, ..self }
     }
 
-    /// The same planner where samples are usually `usual` s apart: a plan that is made where they follow sooner has holds of
-    /// about that, so that its cost does not grow with their number.
+    /// The same planner if samples are usually `usual` s apart. A plan made when they follow sooner has holds of about that
+    /// length, so that its cost does not grow with their number.
     #[must_use]
     pub(crate) fn usually(self, usual: f64) -> Self {
         Self { usual, ..self }
     }
 
-    /// The same planner for a plant that is given the mean of an integral over each period.
+    /// The same planner for a plant that receives the mean of an integral over each period.
     #[must_use]
     pub(crate) fn integrated(self, integral: Integral) -> Self {
         Self { integral: Some(integral), ..self }
     }
 
-    /// The same planner with these policies to begin a search with.
+    /// The same planner with these policies, from which a search begins.
     #[must_use]
     pub(crate) fn led(self, policies: &'a [Policy]) -> Self {
         Self { policies, ..self }
     }
 
-    /// The same planner, whose plans need not end at an equilibrium where they reach so many seconds, finite, > 0, past the
+    /// The same planner for plans that need not end at an equilibrium if they reach `horizon` seconds, finite, > 0, past the
     /// last deadline and the sample.
     #[must_use]
     pub(crate) fn until(self, horizon: Option<f64>) -> Self {
         Self { horizon, ..self }
     }
 
-    /// The same planner for plans that reach no less far than `before`, with which a search begins.
+    /// The same planner for plans that reach at least as far as `before`, from which a search begins.
     #[must_use]
     pub(crate) fn beyond(self, before: &'a BackupPlan) -> Self {
         Self { before: Some(before), ..self }
     }
 
-    /// The same planner for deadlines that are `factor` times as long as those of `plan`, with which alone a search begins.
+    /// The same planner for deadlines that are `factor` times as long as those of `plan`, from which alone a search begins.
     #[must_use]
     pub(crate) fn beside(self, plan: &'a Plan, factor: f64) -> Self {
         Self { beside: Some((plan, factor)), ..self }
@@ -237,7 +246,7 @@ impl<'a> Planner<'a> {
     /// The time in s between the samples at which the inputs of a new plan change: a multiple of the period.
     fn pace(&self) -> f64 {
         let samples = self.usual / self.period;
-        // The mean of an integral is one over each period.
+        // The mean of an integral is taken over each period.
         if self.integral.is_some() || samples <= FREQUENT {
             return self.period;
         }
@@ -253,21 +262,21 @@ impl<'a> Planner<'a> {
     ///
     /// # Errors
     ///
-    /// What the nearest trial fails at.
+    /// Why the nearest trial fails.
     pub(crate) fn search(&self, t: f64, x: &[f64]) -> Result<Plan, Failure> {
         let paced = Self { period: self.pace(), ..*self };
         let to = |horizon| paced.search_to(horizon, t, x);
         match (self.horizon, self.before.map(|before| before.until.is_finite())) {
             (None, _) | (_, Some(false)) => to(None),
             (Some(_), None) => to(None).or_else(|_| to(self.horizon)),
-            // What went on without an equilibrium most likely does so again.
+            // A plan that continued without an equilibrium most likely does so again.
             (Some(_), Some(true)) => to(self.horizon).or_else(|failure| to(None).map_err(|_| failure)),
         }
     }
 
     /// Searches for a plan that ends at an equilibrium, or at a horizon.
     fn search_to(&self, horizon: Option<f64>, t: f64, x: &[f64]) -> Result<Plan, Failure> {
-        // What the nearest trial fails at says more than another's, or than that another grid has no trials.
+        // The failure of the nearest trial says more than that of another trial, or of a grid without trials.
         let (mut failure, mut nearest) = (None, f64::INFINITY);
         let is_dated = self.last(t) > t || horizon.is_some();
         let longer = LONGER.into_iter().filter(|_| !is_dated).map(|undated| (GRIDS[0], undated));
@@ -294,7 +303,7 @@ impl<'a> Planner<'a> {
             };
             let (sketch, model) = (self.model(coarse), self.model(fine));
             let mut guide = StoppingController::around(&model, x, hold);
-            // What is lost within a hold is led in shorter ones.
+            // If a deviation grows too much within a hold, shorter holds are used.
             let finer =
                 guide.as_ref().map_or(1, |guide| (hold / guide.longest(LED) * (1.0 - 1e-9)) as usize + 1);
             if finer > 1
@@ -374,7 +383,8 @@ impl<'a> Planner<'a> {
         Err(failure.unwrap_or(Failure::NoRest))
     }
 
-    /// The plan that one of `descents` leads to; or what the nearest misses, as [`Trajectory::violation`], and what it fails at.
+    /// The plan to which one of `descents` leads; or the shortfall of the nearest one, as [`Trajectory::violation`], and its
+    /// failure.
     fn descend(
         &self,
         search: &Search<'_>,
@@ -385,7 +395,7 @@ impl<'a> Planner<'a> {
         let (mut checked, mut search): (Option<(f64, Failure)>, _) = (None, search.clone());
         // A few steps show which guesses lead somewhere.
         for &(most, iterations) in rounds {
-            // What the user thinks of is never dropped.
+            // A guess supplied by the user is never dropped.
             let merit = |d: &Descent| (!d.is_wanted, d.best.merit);
             descents.sort_by(|a, b| {
                 let (a, b) = (merit(a), merit(b));
@@ -399,7 +409,7 @@ impl<'a> Planner<'a> {
                 if violation > WORTH && violation >= nearest {
                     continue;
                 }
-                // What is broken between the nodes is asked for with more margin at them.
+                // A requirement broken between the nodes gets more margin at the nodes.
                 let (mut least, mut stuck) = (f64::INFINITY, 0);
                 for _ in 0..TIGHTENED {
                     let gains = search.gains(descent);
@@ -430,11 +440,11 @@ impl<'a> Planner<'a> {
         }
         let missed = descents.iter().map(|descent| &descent.best).filter(|best| best.violation > WORTH);
         let missed = missed.filter_map(|best| Some((best.violation, self.missed(search.times, best)?)));
-        // A trial that is far off was checked too, up to the first thing that it breaks: what it misses most says more.
+        // A trial that is far off was also checked, but only up to its first violation. Its largest violation says more.
         Err(missed.chain(checked).min_by(|a, b| a.0.total_cmp(&b.0)))
     }
 
-    /// What `found` misses most at its nodes, in parts of its size.
+    /// The largest violation of `found` at its nodes, relative to its size.
     fn missed(&self, times: &[f64], found: &Trajectory) -> Option<Failure> {
         let mut most = 0.0;
         let mut failure = None;
@@ -456,8 +466,8 @@ impl<'a> Planner<'a> {
     }
 
     /// The length of a hold in s, and the times at which inputs may change: samples only. `before` holds lead to the last
-    /// deadline, `after` of them past it; or both together to the end of a plan with a horizon. Without a deadline a hold is
-    /// `undated` periods. The last sample before each deadline is a node. `None` for too many samples.
+    /// deadline, `after` holds past it; or both together to the end of a plan with a horizon. Without a deadline a hold is
+    /// `undated` periods. The last sample before each deadline is a node. `None` if there are too many samples.
     fn grid(
         &self,
         t: f64,
@@ -465,14 +475,14 @@ impl<'a> Planner<'a> {
         ([before, after], undated): ([usize; 2], usize),
         horizon: Option<f64>,
     ) -> Option<(f64, Vec<f64>)> {
-        // Round-off of a deadline that is a number of periods leaves it one.
+        // A deadline that is a whole number of periods stays one despite round-off.
         let sample = |r: &Requirement<'_>| ((r.from - t) / self.period + 1e-5).max(0.0) as usize;
         let mut deadlines: Vec<usize> =
             requirements.iter().filter(|r| r.from.is_finite()).map(sample).collect();
         deadlines.sort_unstable();
         deadlines.dedup();
         let last = deadlines.last().copied().unwrap_or(0);
-        // Past the last deadline as it is, not as it is asked for in the search.
+        // Past the actual last deadline, not the one used in the search.
         let past = horizon.map(|horizon| {
             let until = (self.last(t) + AMPLE * horizon).max(self.before.map_or(t, |before| before.until));
             ((until - t) / self.period + 0.5) as usize + 1 - last
@@ -519,7 +529,7 @@ impl<'a> Planner<'a> {
             Ok(backup_plan) => return Ok(Plan { backup_plan, ..plan }),
             Err(failure) => failure,
         };
-        // Where not every position is an equilibrium, the law leads back to the one that it is around.
+        // If not every position is an equilibrium, the law leads back to the one around which it was made.
         if !matches!(failure, Failure::Broken { time, .. } if time < times[times.len() - 1]) {
             for law in [ending.at_end(found, self.period), ending.aim.clone()].into_iter().flatten() {
                 plan.stopping = Some(law);
@@ -531,17 +541,17 @@ impl<'a> Planner<'a> {
         Err(failure)
     }
 
-    /// Whether `plan`, found from `x` at `t` for other requirements, keeps these as strictly as a new one has to.
+    /// Whether `plan`, found from `x` at `t` for other requirements, keeps these as strictly as a new plan has to.
     pub(crate) fn keeps(&self, plan: &Plan, t: f64, x: &[f64]) -> bool {
         self.walk(plan, 1.0, Grid { period: self.period, even: true }, (t, x), None, true).is_ok()
     }
 
-    /// A backup plan that begins with `u` for one period from `x` at `t`: the reference of `plan` is followed from there, or
-    /// the plant is stopped.
+    /// A backup plan that begins with `u` for one period from `x` at `t`. Then the reference of `plan` is followed, or the
+    /// plant is stopped.
     ///
     /// # Errors
     ///
-    /// What the first of these fails at.
+    /// Why the first of these fails.
     pub(crate) fn behind(&self, plan: &Plan, t: f64, x: &[f64], u: &[f64]) -> Result<BackupPlan, Failure> {
         self.on_a_grid(|grid| {
             let at = t + self.period;
@@ -550,7 +560,7 @@ impl<'a> Planner<'a> {
             let strictness = if self.regular { 1.0 } else { WARY };
             let walk = |follows| self.walk(plan, strictness, grid, (t, x), Some(u), follows);
             match has_reference {
-                // What ends without an equilibrium ends with its reference.
+                // A plan without an equilibrium ends with its reference.
                 true if plan.is_finite() => walk(true),
                 true => walk(true).or_else(|failure| walk(false).map_err(|_| failure)),
                 false => walk(false),
@@ -558,7 +568,7 @@ impl<'a> Planner<'a> {
         })
     }
 
-    /// The end of `walk`, which has followed the reference of `plan` as far as it goes: at an equilibrium, or at its
+    /// The end of `walk`, which has followed the reference of `plan` as far as it goes: at an equilibrium, or at the plan's
     /// horizon.
     fn conclude(&self, walk: Walk<'a>, plan: &Plan) -> Result<BackupPlan, Failure> {
         match (&plan.stopping, &plan.reference) {
@@ -568,15 +578,15 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// The remainder of the backup plan that `plan` has, from `x` at `t`: its inputs as they are; or where the plant is not
-    /// quite the model, or forgets no round-off, the feedback that they came from.
+    /// The remainder of the backup plan of `plan`, from `x` at `t`: its inputs as they are; or, if the plant deviates from
+    /// the model or does not forget round-off, the feedback that they came from.
     ///
     /// # Errors
     ///
-    /// What it fails at.
+    /// Why it fails.
     pub(crate) fn tail(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<BackupPlan, Failure> {
         let nu = self.dims[1];
-        // As many of its holds as `held`, then the law behind it.
+        // Replays `held` of its holds, then applies the law behind it.
         let replay = |grid: Grid, held: usize, follows: bool| {
             let mut walk = self.begin(plan, KEPT, grid, (t, x))?;
             let mut at = t;
@@ -591,7 +601,7 @@ impl<'a> Planner<'a> {
             let left = plan.backup_plan.inputs.iter().filter(|(end, _)| *end > t + grid.slack());
             for (end, u) in left.take(held) {
                 if *end > at + grid.slack() {
-                    // Not again what has come to its end, which grows by a hold at every sample.
+                    // Holds after the end are not replayed, since there is one more at every sample.
                     if plan.stopping.as_ref().is_some_and(|stopping| walk.may_end(stopping)) {
                         break;
                     }
@@ -607,7 +617,7 @@ impl<'a> Planner<'a> {
         self.on_a_grid(|grid| {
             let kept = match plan.stays() {
                 true => replay(grid, usize::MAX, false),
-                // The law took over at the end of the present hold.
+                // The law takes over at the end of the present hold.
                 false => replay(grid, 1, true).or_else(|failure| replay(grid, 1, false).map_err(|_| failure)),
             };
             kept.or_else(|failure| {
@@ -621,14 +631,14 @@ impl<'a> Planner<'a> {
     ///
     /// # Errors
     ///
-    /// What it fails at.
+    /// Why it fails.
     pub(crate) fn holds(&self, t: f64, x: &[f64], u: &[f64]) -> Result<(), Failure> {
         let grid = Grid { period: self.period, even: true };
         let mut walk = Walk::new(self.model(self.pace()), self.requirements, 1.0, grid, (t, x))?;
         walk.hold_until(u, t + self.period)
     }
 
-    /// Runs the plant on from `x` until the next sample, under `u`, to round-off.
+    /// Runs the plant from `x` until the next sample, under `u`, to round-off.
     pub(crate) fn run(&self, x: &mut [f64], u: &[f64]) {
         let grid = Grid { period: self.period, even: true };
         if let Ok(mut walk) = Walk::new(self.model(self.pace()), &[], 0.0, grid, (0.0, x)) {
@@ -636,11 +646,11 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// The input of the law of `plan` at `t` and `x`, if from there it nearly keeps every requirement.
+    /// The input of the law of `plan` at `t` and `x`, if it nearly keeps every requirement from there.
     ///
     /// # Errors
     ///
-    /// What it fails at.
+    /// Why it fails.
     pub(crate) fn nearly(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<[f64; MAX_INPUTS], Failure> {
         let grid = Grid { period: self.period, even: true };
         let follow = |follows| self.walk(plan, NEARLY, grid, (t, x), None, follows);
@@ -648,11 +658,11 @@ impl<'a> Planner<'a> {
         Ok(near.inputs[0].1)
     }
 
-    /// What `find` finds for samples in the present period; else, where the plan was made for another, for those that it
-    /// was made for from the next one on.
+    /// The result of `find` for samples with the present period. If that fails and the plan was made for another period: the
+    /// result for samples with that one from the next sample on.
     fn on_a_grid<R>(&self, find: impl Fn(Grid) -> Result<R, Failure>) -> Result<R, Failure> {
         let grid = Grid { period: self.period, even: true };
-        // Of periods that are not known there are no means.
+        // Over unknown periods there are no means.
         find(grid).or_else(|failure| match self.regular || self.integral.is_some() {
             true => Err(failure),
             false => find(Grid { even: false, ..grid }).map_err(|_| failure),
@@ -695,8 +705,8 @@ impl<'a> Planner<'a> {
         self.conclude(walk, plan)
     }
 
-    /// A step of the model with which a hold from `x` is resolved to `allowed`, with inputs at both bounds, if there is one; else
-    /// at one of them: at the other a tank runs empty.
+    /// A step of the model that resolves a hold from `x` to `allowed` with inputs at both bounds, if there is one. Otherwise
+    /// a step that does so at one of them: at the other a tank may run empty.
     fn resolved(&self, x: &[f64], hold: f64, allowed: f64) -> Option<f64> {
         let nu = self.dims[1];
         let mut step = (hold / 8.0).min((COARSE * self.period).max(hold / FINE));
@@ -712,7 +722,7 @@ impl<'a> Planner<'a> {
                 };
                 let (coarse, fine) = (run(step), run(step / 2.0));
                 let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= allowed * (1.0 + b.abs());
-                // NaN is not.
+                // NaN is not near.
                 coarse.iter().zip(&fine).all(is_near)
             };
             match [1.0, -1.0].map(is_resolved) {
@@ -725,12 +735,12 @@ impl<'a> Planner<'a> {
         one
     }
 
-    /// The latest deadline in s, or the time of a search from `t` that has none.
+    /// The latest deadline in s, or the time `t` of the search if there is none.
     fn last(&self, t: f64) -> f64 {
         self.requirements.iter().map(|r| r.from).filter(|t| t.is_finite()).fold(t, f64::max)
     }
 
-    /// The mean inputs of `policy` over each hold until the last deadline, then of the plant stopped.
+    /// The mean inputs of `policy` over each hold until the last deadline, then those that stop the plant.
     fn follow(
         &self,
         model: &Model<'_>,
@@ -763,8 +773,7 @@ impl<'a> Planner<'a> {
         inputs
     }
 
-    /// The law that leads from `x` to an equilibrium within every set that is asked for at `end`, as deep inside as one is
-    /// found.
+    /// The law that leads from `x` to an equilibrium within every set required at `end`, as deep inside as one is found.
     fn aim(
         &self,
         model: &Model<'_>,
@@ -777,7 +786,7 @@ impl<'a> Planner<'a> {
             model.equilibrium_within(x, u.to_vec(), |x, missing| {
                 for requirement in requirements.iter().filter(|r| r.until > end) {
                     let (wanted, h) = (depth * requirement.margin, requirement.model.value(end, x));
-                    // NaN is missing.
+                    // NaN counts as outside.
                     if h >= wanted {
                         continue;
                     }
@@ -819,8 +828,8 @@ impl<'a> Planner<'a> {
         [inputs, vec![aim.input.clone(); times.len()]]
     }
 
-    /// Guesses that go the way of `plan` in `factor` times the time: with its inputs, with those of rates that are so much larger, and
-    /// of accelerations.
+    /// Guesses that follow the trajectory of `plan` in `factor` times the time: with its inputs; with inputs scaled as rates
+    /// are, by 1/`factor`; and with inputs scaled as accelerations are, by its square.
     fn stretched(
         &self,
         model: &Model<'_>,
@@ -830,7 +839,7 @@ impl<'a> Planner<'a> {
         times: &[f64],
     ) -> [Vec<Vec<f64>>; 3] {
         let (equilibrium, begin) = (guide.equilibrium_input(model), times[0]);
-        // Without the feedback of its walk, where it has a reference.
+        // Without the feedback of its rollout, if it has a reference.
         let padded = |u: &Vec<f64>| core::array::from_fn(|i| u.get(i).copied().unwrap_or(0.0));
         let inputs = match &plan.reference {
             Some(reference) => reference.times[1..]
@@ -858,7 +867,7 @@ impl<'a> Planner<'a> {
         })
     }
 
-    /// First guesses: the plant stopped at once, and after inputs to either side.
+    /// First guesses: the plant is stopped at once, or after inputs to either side.
     fn guesses(
         &self,
         model: &Model<'_>,
@@ -895,7 +904,7 @@ impl<'a> Planner<'a> {
             for k in 0..holds {
                 if side.iter().any(|s| *s != 0.0) && (k < 2 || times[k] < times[0] + part * (last - times[0]))
                 {
-                    // What would fall is held upright meanwhile.
+                    // A plant that would fall is held upright meanwhile.
                     match guide.stays() {
                         true => u.copy_from_slice(&guide.equilibrium_input(model)),
                         false => guide.input(model, &x, &mut u),

@@ -1,6 +1,6 @@
 //! Reference trajectories by sequential convex programming.
 //!
-//! The plant is run ahead under a guess, and linearised along it, as are the sets. A quadratic program moves the inputs:
+//! The plant is predicted under a guess, and linearised along it, as are the sets. A quadratic program moves the inputs:
 //!
 //! ```math
 //! \begin{align}
@@ -11,7 +11,7 @@
 //! ```
 //!
 //! with u within its bounds and a trust region, and the convex part of the curvature of the sets at the last multipliers. A
-//! step is kept where the true merit falls. The solver is clarabel: sparse, interior point.
+//! step is kept if the true merit falls. The solver is clarabel: sparse, interior point.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -25,60 +25,60 @@ use super::law::Gain;
 use super::model::{Linear, Model, slopes};
 use crate::scalar::all_finite;
 
-/// Price of a violation of the size of h on the way, against the price of full inputs all the time.
+/// Price of a violation as large as h along the trajectory, in units of the price of full inputs all the time.
 const PENALTY: f64 = 300.0;
-/// The part of its largest h on the way up to which a row is near its edge.
+/// A row counts as near its edge up to this part of the largest h along the trajectory.
 const NEAR: f64 = 0.1;
-/// The price of a row from which it counts, in units of that of a violation.
+/// Least price of a row that counts, in units of that of a violation.
 const PRICED: f64 = 1e-6;
-/// The trust region at first, in parts of half the width of the bounds.
+/// Initial trust region, as a part of half the width of the bounds.
 const TRUST: f64 = 0.7;
-/// Its least size.
+/// Least trust region, in the same unit.
 const LEAST_TRUST: f64 = 1e-3;
-/// Margin that is added for what was missing, in units of it.
+/// Margin that is added for a shortfall, in units of the shortfall.
 const TIGHTER: f64 = 1.5;
-/// The least size of a requirement that is nearly met, as a part of the largest |h| on the way.
+/// Least size of a requirement that is nearly met, as a part of the largest |h| along the trajectory.
 const LEAST_SIZE: f64 = 1e-4;
-/// Part of the expected gain from which a step counts as one that went as expected.
+/// Least part of the expected gain at which a step counts as one that went as expected.
 const AS_EXPECTED: f64 = 0.7;
-/// Part of a trajectory's change that its curvature may be for the linear model to count.
+/// Largest curvature of a trajectory, as a part of its change, for which the linear model counts.
 const BENT: f64 = 0.2;
 
-/// A search: the start, the grid and what has to be met there.
+/// A search: the start, the grid and the requirements on it.
 #[derive(Clone)]
 pub(super) struct Search<'a> {
     pub(super) model: Model<'a>,
     pub(super) requirements: Vec<Requirement<'a>>,
-    /// What margins are multiplied by: larger than in the check.
+    /// Factor on every margin: larger than in the check.
     pub(super) strictness: f64,
     /// The beginning of every hold in s, and the end of the last.
     pub(super) times: &'a [f64],
     pub(super) x: &'a [f64],
-    /// The size of each input, where it has no bounds.
+    /// The size of each input that has no bounds.
     pub(super) size: f64,
     /// Whether the plant has to be at an equilibrium at the end.
     pub(super) at_equilibrium: bool,
     /// Whether its programs are solved without refinement: faster, and to fewer digits.
     pub(super) quick: bool,
-    /// The size of each requirement, where it is not 0: the largest |h| on the way.
+    /// The size of each requirement, if not 0; otherwise the largest |h| along the trajectory is used.
     pub(super) sizes: Vec<f64>,
 }
 
-/// Inputs on the grid, one more for the equilibrium at the end, and where they lead.
+/// Inputs on the grid, with one more for the equilibrium at the end, and the trajectory to which they lead.
 #[derive(Clone, Default)]
 pub(super) struct Trajectory {
     pub(super) inputs: Vec<Vec<f64>>,
     pub(super) states: Vec<Vec<f64>>,
     /// h − margin at the nodes at which requirements are in force: requirement, node, value.
     values: Vec<(usize, usize, f64)>,
-    /// Largest |h| of each requirement on the way.
+    /// Largest |h| of each requirement along the trajectory.
     sizes: Vec<f64>,
     /// ẋ at the end.
     rate: Vec<f64>,
-    /// Largest rate of each state on the way.
+    /// Largest rate of each state along the trajectory.
     rates: Vec<f64>,
     pub(super) merit: f64,
-    /// The largest violation in parts of its size.
+    /// The largest violation, as a part of its size.
     pub(super) violation: f64,
 }
 
@@ -87,11 +87,11 @@ pub(super) struct Descent {
     pub(super) best: Trajectory,
     /// The trust region of each input, in parts of half the width of its bounds.
     trust: Vec<f64>,
-    /// The price of each row: where it is violated at first, that of its slack, then its multiplier.
+    /// The price of each row: initially that of its slack if it is violated, later its multiplier.
     prices: Vec<f64>,
-    /// The plant beside the best, once it is asked for: one linear model for every hold.
+    /// The linear models near the best trajectory, one for every hold, once they are needed.
     linear: Option<Vec<Linear>>,
-    /// Whether it goes on however far it has come.
+    /// Whether it continues regardless of its progress.
     pub(super) is_wanted: bool,
 }
 
@@ -116,9 +116,9 @@ struct Answer {
 }
 
 impl Search<'_> {
-    /// Asks for more margin of `barrier`, which falls short by `slack` < 0 between the nodes of `near`. If the search has the time
-    /// for so exact an answer: half of what is left of its depth there at most, and from then on its size is that where it is in
-    /// force.
+    /// Asks for more margin of `barrier`, which falls short by `slack` < 0 between the nodes of `near`. If the search has
+    /// time for such an exact answer, it adds at most half of the remaining depth there, and from then on the size of the
+    /// requirement is its size while it is in force.
     pub(super) fn tighten(&mut self, barrier: usize, slack: f64, near: &Trajectory) {
         let of_barrier = self.requirements.iter_mut().enumerate().filter(|(_, r)| r.barrier == barrier);
         for (i, requirement) in of_barrier {
@@ -143,13 +143,13 @@ impl Search<'_> {
         self.model.reach(i, self.size).max(f64::MIN_POSITIVE)
     }
 
-    /// Runs `inputs` ahead, of which the last is for the equilibrium.
+    /// Predicts the trajectory under `inputs`, of which the last is for the equilibrium.
     pub(super) fn run(&self, inputs: Vec<Vec<f64>>) -> Trajectory {
         self.steer(inputs, None)
     }
 
-    /// Runs `inputs` ahead, with the feedback `along` states where there is one. Those of the trajectory are what it made
-    /// of them.
+    /// Predicts the trajectory under `inputs`, with the feedback `along` states if there is one. The inputs of the result
+    /// are those after feedback.
     fn steer(&self, mut inputs: Vec<Vec<f64>>, along: Option<(&[Vec<f64>], &[Gain])>) -> Trajectory {
         let (holds, nx) = (inputs.len() - 1, self.x.len());
         let mut states = vec![self.x.to_vec()];
@@ -168,7 +168,7 @@ impl Search<'_> {
             states.push(x);
         }
         let rate = self.model.rate(&states[holds], &inputs[holds], self.hold(holds - 1)).as_slice().to_vec();
-        // A state that hardly moves is measured by its own size.
+        // A state that hardly moves is measured by a part of the fastest rate.
         let fastest = rates.iter().fold(1e-3, |m: f64, r| m.max(*r));
         rates.iter_mut().for_each(|r| *r = r.max(0.05 * fastest));
         let (mut values, mut sizes) = (Vec::new(), self.sizes.clone());
@@ -179,7 +179,7 @@ impl Search<'_> {
                 if self.sizes[i] == 0.0 {
                     sizes[i] = sizes[i].max(h.abs());
                 }
-                // A deadline between two nodes is asked for at the one before.
+                // A deadline between two nodes is required at the one before.
                 let next = self.times.get(k + 1).map_or(f64::INFINITY, |next| next - 1e-5 * (next - t));
                 let begun = requirement.from < next && t < requirement.until;
                 if k > 0 && begun {
@@ -219,7 +219,7 @@ impl Search<'_> {
         }
     }
 
-    /// Improves the best of `descent`; at most `iterations` quadratic programs.
+    /// Improves the best trajectory of `descent` by at most `iterations` quadratic programs.
     pub(super) fn improve(&self, descent: &mut Descent, iterations: u32) {
         for _ in 0..iterations {
             let Descent { best, trust, prices, linear, .. } = descent;
@@ -233,7 +233,7 @@ impl Search<'_> {
             };
             let expected = best.merit - answer.merit;
             let mut next = self.run(answer.inputs.clone());
-            // What leads elsewhere by itself may be led there: an unstable plant forgets no deviation.
+            // Feedback may lead a plant where open-loop inputs do not: an unstable plant forgets no deviation.
             if best.merit - next.merit <= AS_EXPECTED * expected
                 && let Some(gains) = Gain::along(&self.model, &answer.states, &answer.inputs, along)
             {
@@ -260,21 +260,21 @@ impl Search<'_> {
         }
     }
 
-    /// The plant beside `at`, hold by hold.
+    /// The linear models near `at`, one for every hold.
     fn linear(&self, at: &Trajectory) -> Vec<Linear> {
         let holds = at.inputs.len() - 1;
         (0..holds).map(|k| self.model.linear(&at.states[k], &at.inputs[k], self.hold(k))).collect()
     }
 
-    /// The gains of a feedback along the best of `descent`, if there are any.
+    /// The gains of a feedback along the best trajectory of `descent`, if there are any.
     pub(super) fn gains(&self, descent: &mut Descent) -> Option<Vec<Gain>> {
         let Descent { best, linear, .. } = descent;
         let linear = linear.get_or_insert_with(|| self.linear(best));
         Gain::along(&self.model, &best.states, &best.inputs, linear)
     }
 
-    /// Shrinks the trust in those inputs whose change from `from` to `to` bends the trajectory: an input that turns a vehicle
-    /// bends it, one that drives it does not. Where none does, in all.
+    /// Shrinks the trust region of those inputs whose change from `from` to `to` curves the trajectory: an input that turns
+    /// a vehicle does, one that accelerates it does not. If none does, shrinks all.
     fn shrink(&self, trust: &mut [f64], from: &Trajectory, to: &Trajectory, by: f64) {
         let end = |input: usize, part: f64| {
             let mut x = self.x.to_vec();
@@ -303,7 +303,8 @@ impl Search<'_> {
         }
     }
 
-    /// The answer of the quadratic program around `at`. Rows that are far from their edge come in where the answer would break them.
+    /// The answer of the quadratic program around `at`. Rows that are far from their edge are added if the answer would
+    /// break them.
     fn program(&self, at: &Trajectory, linear: &[Linear], prices: &[f64], trust: &[f64]) -> Option<Answer> {
         let nx = self.model.states();
         let slopes_of = |&(i, k, _): &(usize, usize, f64)| {
@@ -344,7 +345,7 @@ impl Search<'_> {
         let (nx, nu) = (self.model.states(), self.model.inputs());
         let holds = at.inputs.len() - 1;
         let kept: Vec<usize> = (0..rows.len()).filter(|&row| rows[row]).collect();
-        // Variables: δu_0 … δu_N, δx_1 … δx_N, slacks of the rows, of the equilibrium.
+        // Variables: δu_0 … δu_N, δx_1 … δx_N, slacks of the rows, slacks of the equilibrium.
         let input = |k: usize, i: usize| k * nu + i;
         let state = |k: usize, i: usize| (holds + 1) * nu + (k - 1) * nx + i;
         let first_slack = (holds + 1) * nu + holds * nx;
@@ -384,7 +385,7 @@ impl Search<'_> {
             entry(b.len(), first_slack + slack, -1.0);
             b.push(value / size);
         }
-        // The equilibrium at the end, if there is to be one.
+        // The equilibrium at the end, if required.
         let hold = self.hold(holds - 1);
         let Linear { a, b: by } = self.model.linear(&at.states[holds], &at.inputs[holds], hold);
         let a = (a - DMatrix::identity(nx, nx)) / hold;
@@ -484,7 +485,7 @@ impl Search<'_> {
         Some(Answer { inputs, states, prices, merit })
     }
 
-    /// The part of −∂²h/∂x² that is convex, of requirement `i` at node `k`, by differences.
+    /// The convex part of −∂²h/∂x², of requirement `i` at node `k`, by differences.
     fn curvature(&self, i: usize, k: usize, x: &[f64]) -> DMatrix<f64> {
         let nx = x.len();
         let (mut moved, mut ends) = (x.to_vec(), [vec![0.0; nx], vec![0.0; nx]]);

@@ -1,4 +1,4 @@
-//! The input of a sample: u_ref where a plan backs it, else as near to it as one does.
+//! The input of a sample: u_ref if a plan backs it, otherwise the nearest input to it that a plan backs.
 
 use super::planning::{AMPLE, Planning};
 use super::{AssuranceStatus, Driver, Reason};
@@ -7,84 +7,91 @@ use crate::filter::rows::Rows;
 use crate::plan::{BackupPlan, Failure, Plan, Planner, SearchProgress};
 use crate::scalar::all_finite;
 
-/// Largest input of a plan that is comfortable where every set has been reached, as a part of its bounds.
+/// Largest input of a comfortable plan once every set has been reached, as a part of its bounds.
 const COMFORTABLE: f64 = 0.5;
-/// The part of h that is left by a plan that comes nowhere near the edge of a set: it may be as hard as the bounds allow. Where
-/// u_ref had the last input, and where it had not: who is back too soon is soon stopped again.
+/// A plan counts as far from the edge of a set if it leaves this part of h; it may then use the bounds fully. The first is
+/// used if u_ref had the last input, the second if not: u_ref that returns too soon is soon stopped again.
 const FAR: [f64; 2] = [0.1, 0.9];
-/// The same before, in units of what the first plan needs: who does nothing is not led later and later, and ever harder. No more
-/// than the first plan needs, or this part of the bounds, so that some of them is left for who is led to it smoothly.
+/// Largest input of a comfortable plan before every set has been reached, in units of the largest input of the first plan.
+/// The limit prevents a passive u_ref from being led later and later, and with ever larger inputs.
 const EASE: f64 = 2.0;
+/// The largest value of that limit, as a part of the bounds, unless the first plan needs more: some of the bounds is left
+/// for a smooth transition.
 const LEISURE: f64 = 0.7;
-/// And in units of the largest u_ref so far.
+/// The same limit in units of the largest u_ref so far.
 const EAGER: f64 = 1.5;
-/// The largest input of another plan for which the one that drives gives way to u_ref, in units of what is comfortable: with more
-/// they would soon change places again. Or as large as u_ref has been: who drives hard has not to wait for a gentle one.
+/// Largest input of another plan for which the driving plan yields to u_ref, in units of what is comfortable: with a larger
+/// one they would soon change places again. An input as large as u_ref has been is also allowed, so that an aggressive u_ref
+/// need not wait for a gentle plan.
 const GENTLER: f64 = 0.5;
-/// The change of an input from one sample to the next that is no jump, as a part of the width of its bounds.
+/// The largest change of an input between samples that does not count as a jump, as a part of the width of its bounds.
 const SMOOTH: f64 = 0.15;
-/// The part of the way to an input that is preferred that is tried first, and halvings of the rest where it is possible.
+/// The first part tried of the way to a preferred input.
 const FIRST: f64 = 0.125;
+/// Halvings of the remaining interval if that part is possible.
 const BISECTIONS: u32 = 3;
-/// The part of an input that goes back from the plan at each sample: all of it at once would have the plan take it again at the
-/// next, and the input jump between the two. And that where another plan backs all of u_ref.
+/// The part of an input that the plan gives back at each sample. If it gave back all of it at once, the plan would take it
+/// again at the next sample, and the input would jump between the two.
 const GIVEN_BACK: f64 = 1.0 / 32.0;
+/// The same in units of [`GIVEN_BACK`] if another plan backs all of u_ref.
 const RETURNED: f64 = 8.0;
-/// The samples after which the plan gives back, where it had to take more.
+/// Number of samples after which the plan gives back again, if it had to take more.
 const HELD: u32 = 16;
-/// How much more of the plan there is in an input than in the last one, in units of what goes back: the first that is possible.
+/// Candidate changes of the plan's share from the last input, in units of [`GIVEN_BACK`]. The first possible one is taken.
 const SHARES: [f64; 5] = [-1.0, 0.0, 1.0, 4.0, 12.0];
-/// The least and the most samples after which it is tried again to find a plan behind u_ref, where none was found or the one that
-/// was found was soon lost.
+/// The least and the most samples before another search for a plan behind u_ref, if none was found or the one found was soon
+/// lost.
 const PAUSES: [u32; 2] = [8, 128];
 
-/// How u_ref has its way, from sample to sample.
+/// How much of u_ref passes, from sample to sample.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct ChoiceMemory {
-    /// The largest input of a plan that is comfortable, as a part of its bounds: by what the first one needs, and u_ref has had since.
+    /// The largest input of a comfortable plan, as a part of its bounds: from the largest input of the first plan, and from
+    /// the largest u_ref since then.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     ease: f64,
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     eagerness: f64,
-    /// The search for a plan behind u_ref, and the samples until it goes on.
+    /// The search for a plan behind u_ref, and the number of samples until it continues.
     progress: SearchProgress,
     wait: u32,
-    /// The samples of the last pause between trials, and those since that u_ref was let pass in a row.
+    /// The number of samples of the last pause between trials, and the number of samples in a row since then that let u_ref
+    /// pass.
     pause: u32,
     passed: u32,
-    /// The samples until a part of the plan is given back again.
+    /// The number of samples until the plan gives back a part again.
     held: u32,
-    /// Whether the plan that drives gives way to u_ref, behind all of which another plan was found.
+    /// Whether the driving plan yields to u_ref, because another plan was found behind all of it.
     returns: bool,
-    /// Whether u_ref had the last sample, whole or in part.
+    /// Whether u_ref determined the last input, wholly or in part.
     wished: bool,
-    /// Why it has not its way.
+    /// Why u_ref does not pass.
     pub(super) reason: Option<Reason>,
 }
 
 impl ChoiceMemory {
-    /// The first, beside the first plan.
+    /// The initial memory, for the first plan.
     pub(super) fn beside(first: &BackupPlan) -> Self {
         Self { ease: (EASE * first.effort).min(first.effort.max(LEISURE)), wished: true, ..Self::default() }
     }
 
-    /// Whether it is none that a filter had.
+    /// Whether no filter could have had it.
     pub(super) fn is_flawed(&self) -> bool {
         self.ease.is_nan() || self.eagerness.is_nan() || self.progress.is_flawed()
     }
 
-    /// Notes that a plan was found, and whether another one drove.
+    /// Records that a plan was found, and whether another one drove.
     fn find(&mut self, drove: bool) {
         self.progress = SearchProgress::default();
         if drove {
-            // The plan gives way in as many samples.
+            // The plan yields over as many samples.
             (self.pause, self.wait) = (self.longer(), (1.0 / (RETURNED * GIVEN_BACK)) as u32);
             self.returns = true;
         }
     }
 
-    /// Notes that the search came to its end and found none.
+    /// Records that the search ended without a plan.
     fn give_up(&mut self) {
         self.progress = SearchProgress::default();
         self.pause = self.longer();
@@ -95,13 +102,13 @@ impl ChoiceMemory {
         (2 * self.pause).clamp(PAUSES[0], PAUSES[1])
     }
 
-    /// Notes that the plan's own input was the part `share` of the last sample's, and is that of this one's.
+    /// Records the plan's share of the last input and of this one.
     pub(super) fn note(&mut self, share: [f64; 2], driver: Driver) {
         self.wished = matches!(driver, Driver::Reference | Driver::Eased);
         self.pass(share.map(|share| share <= GIVEN_BACK));
     }
 
-    /// Notes who had the last sample, and who has this one.
+    /// Records whether u_ref passed at the last sample, and whether it passes at this one.
     fn pass(&mut self, [before, now]: [bool; 2]) {
         self.wait = self.wait.saturating_sub(1);
         self.returns &= !now;
@@ -112,15 +119,16 @@ impl ChoiceMemory {
                     self.pause = 0;
                 }
             }
-            // Given back too soon: the next time it takes longer.
+            // Given back too soon: the next attempt waits longer.
             [true, false] => (self.wait, self.passed) = (self.wait.max(self.pause), 0),
             _ => self.passed = 0,
         }
     }
 }
 
-/// How an input moves with its sample, as long as the piece of the filter is the same: with `rows` times the answer of the rows
-/// and `wish` times u_ref. The rest, that of a plan, is held, and so is each input that is `held`.
+/// How an input varies with its sample, as long as the filter stays on the same piece: it contains `rows` times the answer
+/// of the rows and `wish` times u_ref. The remainder, which is the plan's, is held constant, and so is each input that is
+/// `held`.
 #[derive(Clone, Copy)]
 pub(super) struct Piece {
     pub(super) rows: f64,
@@ -138,21 +146,21 @@ impl Piece {
     }
 }
 
-/// An input that was chosen, and what is behind it.
+/// A chosen input, and the plan behind it.
 pub(super) struct Chosen {
     pub(super) driver: Driver,
     pub(super) piece: Piece,
-    /// The part of it that is the plan's own.
+    /// The plan's own share of it.
     pub(super) share: f64,
     pub(super) backup_plan: BackupPlan,
-    /// A new plan, whose backup plan that is.
+    /// A new plan, to which that backup plan belongs.
     pub(super) plan: Option<Plan>,
 }
 
-/// What is wished at a sample.
+/// The inputs asked for at a sample.
 #[derive(Clone, Copy)]
 pub(super) struct Wish<'a> {
-    /// u_ref, and that within its bounds.
+    /// u_ref, and u_ref within its bounds.
     pub(super) wish: &'a [f64],
     pub(super) wanted: &'a [f64],
     /// The answer of the rows.
@@ -161,32 +169,34 @@ pub(super) struct Wish<'a> {
     pub(super) reached: bool,
 }
 
-/// The candidates for the input of a sample, and what they are judged by.
+/// The candidates for the input of a sample, and the criteria for choosing among them.
 struct Choice<'a, 'p> {
     planning: &'a Planning<'a>,
     planner: &'a Planner<'p>,
     t: f64,
     x: &'a [f64],
     wish: Wish<'a>,
-    /// The current plan, and the part of the last input that was its own.
+    /// The current plan, and its own share of the last input.
     plan: &'a Plan,
     share: f64,
-    /// Whether u_ref is a number; whether the plan has no part in the input, so that u_ref passes where it may.
+    /// Whether u_ref is a number; whether the plan has hardly any share of the last input, so that u_ref passes where it
+    /// may.
     is_wish: bool,
     passes: bool,
-    /// The largest input of a plan that is comfortable, as a part of its bounds.
+    /// The largest input of a comfortable plan, as a part of its bounds.
     comfort: f64,
-    /// Whether u_ref had the last sample.
+    /// Whether u_ref determined the last input.
     wished: bool,
 }
 
 impl Planning<'_> {
-    /// The input from `x` at `t`, the first of these that has a plan behind it: u_ref, with a comfortable plan; where every set has
-    /// been reached the answer of the rows; else as far towards u_ref or the rows from the plan's own input as one goes.
+    /// The input from `x` at `t`: the first of these that has a plan behind it. First u_ref, with a comfortable plan; then,
+    /// once every set has been reached, the answer of the rows; then the plan's own input, moved towards u_ref or the rows
+    /// as far as a plan allows.
     ///
     /// # Errors
     ///
-    /// What the plan fails at, where it keeps the promises no more.
+    /// Why the plan fails, if it no longer keeps the promises.
     pub(super) fn chosen(
         &self,
         planner: &Planner<'_>,
@@ -207,12 +217,13 @@ impl Planning<'_> {
         }
         match planner.tail(plan, t, x) {
             Ok(kept) => Ok(choice.from_plan(kept, memory)),
-            // The plant is not where the plan was: whatever else there is keeps the promise.
+            // The plant is off the plan: anything else that keeps the promise is used.
             Err(failure) => choice.any_other().ok_or(failure),
         }
     }
 
-    /// `chosen` as it is, or where its input jumps from the last one, one on the way between the two that has a plan behind it.
+    /// `chosen` as it is; or, if its input jumps from the last one, an input on the way between the two that has a plan
+    /// behind it.
     pub(super) fn smoothed(
         &self,
         planner: &Planner<'_>,
@@ -228,7 +239,7 @@ impl Planning<'_> {
             (piece.held[i], *u) = (smooth != *u, smooth);
         }
         let is_smooth = !piece.held.contains(&true);
-        // u_ref jumps where it wishes to, but not to it from another.
+        // u_ref may jump by itself, but the input must not jump to it from another.
         let goes_on = driver == Driver::Reference && self.before().memory.wished;
         if goes_on || self.before().status != AssuranceStatus::Assured || is_smooth {
             return chosen;
@@ -240,7 +251,7 @@ impl Planning<'_> {
             return Chosen { driver, piece, backup_plan, ..chosen };
         }
         let renewed = || planner.renewed(plan, t, x, smooth, &mut SearchProgress::default()).ok();
-        // Where u_ref has just passed, one behind it is sought first.
+        // If u_ref has only just passed, a plan behind the smoothed input is sought first.
         let may_renew = !reached && self.before().share > GIVEN_BACK;
         match may_renew.then(renewed).flatten() {
             Some(plan) => {
@@ -256,13 +267,14 @@ impl Choice<'_, '_> {
         self.planner.behind(plan, self.t, self.x, u).ok()
     }
 
-    /// Who chose u_ref within its bounds.
+    /// The driver for u_ref within its bounds.
     fn passed(&self) -> Driver {
         if self.wish.wanted == self.wish.wish { Driver::Reference } else { Driver::Eased }
     }
 
-    /// Whether a plan is comfortable. Where every set has been reached: with the margin that the rows aim at and gently, as long as
-    /// u_ref has its way; where the rows took over they let it pass, or it is far from every edge.
+    /// Whether a plan is comfortable. Once every set has been reached it has to keep the margin that the rows aim at. While
+    /// u_ref drives it also has to be gentle or far from every edge; after the rows took over, it has to be far from every
+    /// edge.
     fn is_comfortable(&self, backup_plan: &BackupPlan) -> bool {
         let is_gentle = backup_plan.effort <= self.comfort;
         let Some(at) = backup_plan.tightest.filter(|_| self.wish.reached) else {
@@ -280,8 +292,8 @@ impl Choice<'_, '_> {
         at.slack >= least.max(margin)
     }
 
-    /// u_ref as it is or within its bounds, with a comfortable plan behind it: the current one, that moved in time, or
-    /// another. Notes why not.
+    /// u_ref as it is or within its bounds, with a comfortable plan behind it: the current one, the current one moved in
+    /// time, or another. Otherwise records why not.
     fn u_ref(&self, memory: &mut ChoiceMemory) -> Option<Chosen> {
         if !(self.is_wish && self.passes) {
             return None;
@@ -309,8 +321,8 @@ impl Choice<'_, '_> {
         Some(chosen(plan.backup_plan.clone(), Some(plan)))
     }
 
-    /// The answer of the rows where every set has been reached, or as near to u_ref from it as is comfortable, so that the input does not
-    /// jump between the two.
+    /// The answer of the rows once every set has been reached, moved as near to u_ref as is comfortable, so that the input
+    /// does not jump between the two.
     fn rows(&self) -> Option<Chosen> {
         if !(self.wish.reached && self.passes) {
             return None;
@@ -333,7 +345,7 @@ impl Choice<'_, '_> {
         Some(chosen(if wish > 0.0 { Driver::Eased } else { Driver::Rows }, wish, backup_plan))
     }
 
-    /// u_ref or the answer of the rows with any plan behind it.
+    /// u_ref or the answer of the rows, with any plan behind it.
     fn any_other(&self) -> Option<Chosen> {
         let wished = self.is_wish.then_some((self.passed(), Piece::WISH, self.wish.wanted));
         let mut others = wished.into_iter().chain([(Driver::Rows, Piece::ROWS, self.wish.rows)]);
@@ -342,8 +354,8 @@ impl Choice<'_, '_> {
         Some(Chosen { driver, piece, share: 0.0, backup_plan, plan: None })
     }
 
-    /// From the plan's own input, that of `kept`, towards u_ref or the rows: as near as can be at first, then as near as last, or a little
-    /// more or less.
+    /// From the plan's own input, that of `kept`, towards u_ref or the rows: at first as near to these as possible, then
+    /// about as near as at the last sample.
     fn from_plan(&self, kept: BackupPlan, memory: &mut ChoiceMemory) -> Chosen {
         let to_rows = self.wish.reached || !self.is_wish;
         let (own, far) = (kept.inputs[0].1, if to_rows { self.wish.rows } else { self.wish.wanted });
@@ -366,7 +378,7 @@ impl Choice<'_, '_> {
             return mixed(1.0 - part, backup_plan, None);
         }
         let between = |share: f64| -> [f64; MAX_INPUTS] {
-            // All of it is itself, to the last bit.
+            // All of it is `far` itself, to the last bit.
             let part =
                 |i: usize| if share == 0.0 { far[i] } else { own[i] + (1.0 - share) * (far[i] - own[i]) };
             core::array::from_fn(|i| if i < far.len() { part(i) } else { 0.0 })
@@ -374,7 +386,7 @@ impl Choice<'_, '_> {
         let returned = (self.share - RETURNED * GIVEN_BACK).max(0.0);
         let gentler = (GENTLER * self.comfort).max(memory.eagerness);
         if !to_rows && let Some(other) = self.continue_search(self.wish.wanted, memory, gentler) {
-            // At once where the two plans lead apart.
+            // At once if the two plans lead apart.
             let gently = self.behind(&other, &between(returned)[..far.len()]);
             let (share, backup_plan) = gently
                 .map_or_else(|| (0.0, other.backup_plan.clone()), |backup_plan| (returned, backup_plan));
@@ -383,7 +395,7 @@ impl Choice<'_, '_> {
         let shares =
             SHARES.map(|more| self.share + more * GIVEN_BACK).into_iter().filter(|share| *share < 1.0);
         let first = memory.returns.then_some(returned);
-        // On the way to a deadline the plan gives back to another one alone: u_ref leads off it.
+        // On the way to a deadline the plan gives back only to another plan, since u_ref leads away from it.
         let shares = shares.skip(usize::from(!to_rows || memory.held > 0));
         let found = first.into_iter().chain(shares).find_map(|share| {
             let backup_plan = self.behind(self.plan, &between(share)[..far.len()]).filter(gentle)?;
@@ -397,7 +409,7 @@ impl Choice<'_, '_> {
         mixed(share, backup_plan, None)
     }
 
-    /// A plan behind `u` that needs no more than `comfort` where one is sought at this sample, and is found.
+    /// A plan behind `u` that needs no more than `comfort`, if one is sought at this sample and found.
     fn continue_search(&self, u: &[f64], memory: &mut ChoiceMemory, comfort: f64) -> Option<Plan> {
         if memory.wait > 0 {
             return None;
@@ -416,8 +428,8 @@ impl Choice<'_, '_> {
     }
 }
 
-/// The part of the way `from` one input `to` another at the end of which there is the last one, of those tried, with a
-/// backup plan, and that; 0 for `from`, whose backup plan is `kept`.
+/// Bisects the way `from` one input `to` another. Returns the farthest part tried that has a backup plan, and that plan; 0
+/// for `from`, whose backup plan is `kept`.
 fn towards(
     from: &[f64],
     to: &[f64],

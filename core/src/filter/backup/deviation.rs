@@ -1,42 +1,44 @@
-//! What the plant was seen to do beside its model: the difference between the measured state and the one that the model leads to
-//! under the inputs given, per second. It bounds what the next hold can bring (`docs/guarantees.md#will-it-always`).
+//! The observed deviation of the plant from its model: the difference between the measured state and the one that the model
+//! predicts under the inputs given, per second. It is used to bound the effect of the next hold
+//! (`docs/guarantees.md#will-it-always`).
 
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// The part of a period over which a difference is seen at least: over less it is round-off.
+/// Shortest time over which a deviation is measured, as a part of a period: over less it is round-off.
 const STRETCH: f64 = 0.5;
-/// A difference over a hold that every plan has a margin for, as a part of a state's size.
+/// Deviation over a hold that every plan has a margin for, as a part of a state's size.
 const COVERED: f64 = 5e-8;
 
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Deviation {
-    /// When in s the present stretch began, where the plant was measured.
+    /// When the present measuring interval began, in s, at a measured state.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     since: f64,
-    /// Where the model has led from there until the last sample.
+    /// The state predicted by the model from there until the last sample.
     pub(super) state: Vec<f64>,
-    /// The rate of each state beside the model over the last stretch, in its unit per s.
+    /// The rate of deviation of each state over the last interval, in its unit per s.
     last: Vec<f64>,
-    /// The largest size of these that was seen twice in a row in the same direction: a plant that was carried away once, or there
-    /// and back, is not for ever.
+    /// The largest rate that was seen twice in a row in the same direction: a plant that was displaced once, or there and
+    /// back, does not count as deviating for ever.
     rates: Vec<f64>,
 }
 
 impl Deviation {
-    /// Begins at the state `x`, measured at `t`.
+    /// Starts at the state `x`, measured at `t`.
     pub(super) fn from(t: f64, x: &[f64]) -> Self {
         Self { since: t, state: x.to_vec(), last: vec![0.0; x.len()], rates: vec![0.0; x.len()] }
     }
 
-    /// Sees the state `x` at `t`, where the model has led to `state`. What is not measured, `None`, is run on farther.
+    /// Compares the state `x` at `t` with `state`, which the model predicts. If x is not measured (`None`), the prediction
+    /// is continued.
     pub(super) fn see(&mut self, t: f64, x: Option<&[f64]>, state: Vec<f64>, period: f64) {
         self.state = state;
         let stretch = t - self.since;
         let Some(x) = x.filter(|_| stretch >= STRETCH * period) else { return };
         for (((rate, last), state), x) in self.rates.iter_mut().zip(&mut self.last).zip(&self.state).zip(x) {
-            // A model that leads nowhere tells nothing.
+            // A prediction that is not finite carries no information.
             let now = (x - state) / stretch;
             let now = if now.is_finite() { now } else { 0.0 };
             if now * *last > 0.0 {
@@ -48,14 +50,14 @@ impl Deviation {
         self.state.copy_from_slice(x);
     }
 
-    /// By how much each state may differ from the model after `hold` s; `None` where every plan has a margin for it at `x`.
+    /// By how much each state may deviate from the model after `hold` s; `None` if every plan has a margin for it at `x`.
     pub(super) fn after(&self, hold: f64, x: &[f64]) -> Option<Vec<f64>> {
         let differs = self.rates.iter().map(|rate| rate * hold);
         let is_covered = differs.clone().zip(x).all(|(differs, x)| differs <= COVERED * (1.0 + x.abs()));
         (!is_covered).then(|| differs.collect())
     }
 
-    /// Whether it is one of a plant with so many states.
+    /// Whether it belongs to a plant with `states` states.
     pub(super) fn fits(&self, states: usize) -> bool {
         let Self { since, state, last, rates } = self;
         let are_rates = |rates: &[f64]| rates.len() == states && rates.iter().all(|rate| rate.is_finite());

@@ -1,4 +1,4 @@
-//! The first sample: the plan that the promises rest on, and the earliest deadlines that a plan keeps.
+//! The first sample: the plan on which the promises rest, and the earliest deadlines that a plan keeps.
 
 use alloc::vec::Vec;
 
@@ -9,19 +9,19 @@ use crate::elementary;
 use crate::filter::{AssuranceStatus, Begin};
 use crate::plan::{BackupPlan, Failure, Plan, Planner};
 
-/// Parts of the deadlines for which a plan is sought where none is found for the deadlines themselves: it keeps them too. Each
-/// makes a refusal longer by as much as the first search.
+/// Parts of the deadlines for which a plan is sought if none is found for the deadlines themselves; such a plan keeps them
+/// too. Each part prolongs a refusal by as much as the first search.
 pub(super) const SHORTER: [f64; 1] = [0.8];
-/// The most points of a plan's way at which it is looked for its arrival, about.
+/// The approximate largest number of points of a plan's trajectory at which its arrival is looked for.
 const MOST_POINTS: f64 = 4000.0;
-/// How much later than a plan arrives the deadline is that it keeps.
+/// How much later the deadline may be than the plan's arrival, as factors that are tried in turn.
 const ARRIVED: [f64; 2] = [1.001, 1.02];
 
-/// What a first sample is promised with.
+/// The result of a first sample: what is promised, and by which plan.
 pub(super) struct First {
     pub(super) promises: Vec<Option<Promise>>,
     pub(super) plan: Plan,
-    /// Whether the plan is one from before the filter was armed again.
+    /// Whether the plan is from before the filter was armed again.
     pub(super) is_old: bool,
 }
 
@@ -31,14 +31,15 @@ impl Planning<'_> {
     ///
     /// # Errors
     ///
-    /// What the nearest trial fails at.
+    /// Why the nearest trial fails.
     pub fn plan_from(&self, t: f64, x: &[f64], factor: f64) -> Result<BackupPlan, Failure> {
         let x = &self.state(x)[..];
         let promises = self.promises(t, x, |_| factor);
         self.first(promises, (t, self.plans.period), x, &[], &SHORTER).map(|first| first.plan.backup_plan)
     }
 
-    /// What [`Self::plan_from`] says of the deadlines themselves, and [`Self::earliest_deadline`], with one search for both.
+    /// The result of [`Self::plan_from`] for the deadlines themselves, and [`Self::earliest_deadline`], with one search for
+    /// both.
     pub fn appraise(
         &self,
         t: f64,
@@ -53,27 +54,27 @@ impl Planning<'_> {
         }
     }
 
-    /// Whether each barrier is one that a first sample at `t` and `x` could promise: not a soft one, one that ends before its
-    /// deadline, or one without a deadline that begins at once and whose set `x` is outside of.
+    /// Whether a first sample at `t` and `x` could promise each barrier. Not promised are: a soft barrier, one that ends
+    /// before its deadline, and one without a deadline that begins at once and whose set does not contain `x`.
     pub fn promised(&self, t: f64, x: &[f64]) -> impl Iterator<Item = bool> + use<> {
         self.promises(t, &self.state(x), |_| 1.0).into_iter().map(|promise| promise.is_some())
     }
 
-    /// The least factor by which every deadline has to be multiplied for a plan from `x` at `t` to be found, to a
-    /// fiftieth or less where a plan arrives sooner than it has to, and that plan. None is looked for beyond `longest` times the
-    /// deadlines, nor where one would come after the end of its barrier.
+    /// The least factor by which every deadline has to be multiplied so that a plan from `x` at `t` is found, and that plan.
+    /// The factor is accurate to a fiftieth, or less if a plan arrives sooner than it has to. The search goes no further
+    /// than `longest` times the deadlines, nor to a deadline after the end of its barrier.
     pub fn earliest_deadline(&self, t: f64, x: &[f64], longest: f64) -> Option<(f64, BackupPlan)> {
         self.appraise(t, x, longest).1
     }
 
-    /// The same where [none is found](Self::plan_from) for the deadlines themselves, which is not tried again.
+    /// The same if [none is found](Self::plan_from) for the deadlines themselves; these are not tried again.
     pub fn later_deadline(&self, t: f64, x: &[f64], longest: f64) -> Option<(f64, BackupPlan)> {
         self.least(t, x, longest, None)
     }
 
-    /// The model's states along `backup_plan` from the measured state `x` at `t`, in steps of at most `step` s, finite, > 0:
-    /// each with the input that is held from there until the next. The last is the equilibrium, with the input that holds
-    /// it.
+    /// The model's states along `backup_plan` from the measured state `x` at `t`, in steps of at most `step` s, finite, > 0.
+    /// Each comes with the input that is held from there until the next. The last is the equilibrium, with the input that
+    /// holds it.
     pub fn trajectory(
         &self,
         backup_plan: &BackupPlan,
@@ -84,7 +85,7 @@ impl Planning<'_> {
         self.along(backup_plan, t, &self.state(x), step)
     }
 
-    /// [`Self::earliest_deadline`], where `first` was found for the deadlines themselves.
+    /// [`Self::earliest_deadline`]; `first` was found for the deadlines themselves.
     pub(super) fn least(
         &self,
         t: f64,
@@ -111,8 +112,8 @@ impl Planning<'_> {
         Some((factor, plan.backup_plan))
     }
 
-    /// The first plan for `promises`, with their reserve, else without, else for deadlines that are one of the parts `shorter`
-    /// of theirs, else the current one.
+    /// The first plan for `promises`: with their reserve; otherwise without; otherwise for deadlines shortened to one of the
+    /// parts `shorter`; otherwise the current plan.
     pub(super) fn first(
         &self,
         mut promises: Vec<Option<Promise>>,
@@ -135,7 +136,7 @@ impl Planning<'_> {
             && self.plans.horizon.is_none()
             && !self.is_ruled_out(&promises, at.0, x)
         {
-            // What keeps an earlier deadline keeps a later one, though another search may find it.
+            // A plan that keeps an earlier deadline keeps a later one, though another search may find it.
             let mut earlier =
                 shorter.iter().filter_map(|part| search(&self.sooner(&promises, at.0, *part)).ok());
             found = earlier.next().map_or(found, Ok);
@@ -149,7 +150,7 @@ impl Planning<'_> {
         let is_irregular = !self.before().is_regular(at.0, at.1);
         let tail = |planner: &Planner<'_>| planner.irregular(is_irregular).tail(old, at.0, x);
         match self.planned(&promises, at, u, tail) {
-            // One that ends sooner reaches nothing.
+            // A plan that ends sooner does not reach it.
             Ok(backup_plan) if promises.iter().flatten().all(|promise| promise.from < backup_plan.until) => {
                 let mut plan = old.clone();
                 plan.backup_plan = backup_plan;
@@ -159,7 +160,8 @@ impl Planning<'_> {
         }
     }
 
-    /// A plan for `promises` beside one for others, whose deadlines are these by `factor`; only near that one it is sought.
+    /// A plan for `promises` near `plan`. The deadlines of `promises` are `factor` times those that `plan` was made for. The
+    /// search looks only near that plan.
     pub(super) fn beside(
         &self,
         mut promises: Vec<Option<Promise>>,
@@ -178,7 +180,8 @@ impl Planning<'_> {
         Ok(First { promises, plan, is_old: false })
     }
 
-    /// The part of the time until their deadlines that `plan`, which keeps `promises` from `x` at `t`, needs for them all, at most 1.
+    /// `plan` keeps `promises` from `x` at `t`. Returns the part of the time until their deadlines that it needs for all of
+    /// them, at most 1.
     pub(super) fn arrival(&self, promises: &[Option<Promise>], plan: &Plan, t: f64, x: &[f64]) -> f64 {
         let end = plan.backup_plan.inputs.last().map_or(t, |(end, _)| *end);
         let trajectory = self.along(&plan.backup_plan, t, x, self.plans.period.max((end - t) / MOST_POINTS));
@@ -212,21 +215,26 @@ impl Planning<'_> {
     }
 }
 
-/// The least factor for which `find` finds something, to a fiftieth, and that; `None` beyond `longest`. `found` is what it
-/// finds with 1. What is found with a factor, or for a smaller one beside it, is taken to be found with every larger one. `sooner` finds
-/// something beside what was found.
+/// The least factor for which `find` finds something, to a fiftieth, and the result; `None` beyond `longest`. `found` is the
+/// result for factor 1. What is found with a factor, or near it for a smaller one, is assumed to be found with every larger
+/// one. `sooner` looks near an earlier result.
 pub(super) fn least_factor<T>(
     longest: f64,
     mut found: Option<(f64, T)>,
     find: impl Fn(f64) -> Option<(f64, T)>,
     sooner: impl Fn(f64, &(f64, T)) -> Option<(f64, T)>,
 ) -> Option<(f64, T)> {
+    /// Ratio of two factors below which a nearby search is no longer worthwhile.
     const FINE: f64 = 1.02;
+    /// Factor below which the search goes no further.
     const LEAST: f64 = 1e-3;
+    /// Largest factor tried.
     const MOST: f64 = 1e6;
+    /// Largest number of further searches that do not start nearby.
     const SEARCHES: u32 = 3;
+    /// Least ratio of the factor found to the one that failed at which such a search is made.
     const WIDE: f64 = 1.1;
-    // Twice as long until there is one; then by half sooner, and by ever less where none is found beside it.
+    // Double the factor until something is found. Then halve it, and reduce it by less whenever nothing is found nearby.
     let longest = longest.min(MOST);
     let (mut low, mut high) = (0.0, 1.0);
     while found.is_none() && high < longest {
@@ -243,7 +251,7 @@ pub(super) fn least_factor<T>(
                 None => part = elementary::sqrt(part),
             }
         } else if searches > 0 && low > 0.0 && WIDE * low < found.0 {
-            // What goes another way may arrive sooner than anything beside what was found.
+            // Another trajectory may arrive sooner than any near the one found.
             searches -= 1;
             match find(between) {
                 Some(nearer) => (found, part) = (nearer, 0.5),

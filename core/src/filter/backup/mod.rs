@@ -1,15 +1,15 @@
-//! Backup plans: what a filter promises is decided at the first sample, and kept within the bounds whatever u_ref is
-//! (`docs/theory.md#backup-plan`).
+//! Backup plans: the first sample decides what a filter promises, and the promise is kept within the bounds whatever u_ref
+//! is (`docs/theory.md#backup-plan`).
 //!
 //! | module | owns |
 //! |---|---|
-//! | `state` | the memory: the promises, the plan that keeps them, when the last sample was |
-//! | `status` | what is reported of a step |
-//! | `planning` | the planner of some promises, to ask for plans |
+//! | `state` | the memory: the promises, the plan that keeps them, the time of the last sample |
+//! | `status` | the report on a step |
+//! | `planning` | the planner for a set of promises |
 //! | `first` | the plan of a first sample, and the earliest deadlines that a plan keeps |
-//! | `sample` | a sample: what is promised, whether it is kept, who drives |
-//! | `choice` | the input: the candidates in their order |
-//! | `deviation` | what the plant was seen to do beside the model |
+//! | `sample` | a sample: what is promised, whether it is kept, and which source drives the plant |
+//! | `choice` | the input: the candidates, in order |
+//! | `deviation` | the observed deviation of the plant from the model |
 
 mod choice;
 mod deviation;
@@ -38,20 +38,21 @@ use sample::{At, Decision};
 pub use state::PlanState;
 pub use status::{Assurance, AssuranceStatus, Driver, Reason};
 
-/// By how much a clock that is measured may be late, as a part of a hold.
+/// How late a measured clock may be, as a part of a hold.
 const JITTER: f64 = 0.05;
-/// The shortest hold that plans tell from none, as a part of the period: one that is shorter is planned as that, since a plan may
-/// go on where a sample comes sooner. Of an integral plans count every hold.
+/// The shortest hold that plans distinguish from none, as a part of the period. A shorter one is planned as this, since a
+/// plan may continue even if a sample comes sooner.
 const SHORTEST: f64 = 1e-3;
+/// The same behind an integrator: plans account for every hold of an integral.
 const SHORTEST_INTEGRATED: f64 = 0.125;
 
-/// How a filter makes plans ([`Filter::with_plans`]). A number is a period, with plans that end at an equilibrium.
+/// How a filter makes plans ([`Filter::with_plans`]). A plain number is a period, with plans that end at an equilibrium.
 pub struct Plans {
     /// The time in s for which an input is held, finite, > 0.
     period: f64,
-    /// Where no plan ends at an equilibrium, how far one reaches, in s.
+    /// How far a plan that does not end at an equilibrium has to reach, in s; `None` if every plan has to end at one.
     horizon: Option<f64>,
-    /// The most quadratic programs of a search at a sample after the first.
+    /// The largest number of quadratic programs of a search at a sample after the first.
     search_budget: u32,
     policies: Vec<Policy>,
     /// Pairs of barriers whose sets have no state in common.
@@ -65,7 +66,7 @@ impl From<f64> for Plans {
 }
 
 impl Plans {
-    /// The longest deadlines looked for where a barrier takes a later one, in units of those configured.
+    /// The longest deadlines tried for a barrier that accepts a later one, in units of those configured.
     pub const LONGEST: f64 = 16.0;
     /// The default of [`Self::search_budget`].
     pub const SEARCH_BUDGET: u32 = 3;
@@ -76,16 +77,16 @@ impl Plans {
         Self { period, horizon: None, search_budget: Self::SEARCH_BUDGET, policies, apart }
     }
 
-    /// Sets the time in s, finite, > 0, that a plan which does not end at an equilibrium has to reach past the last
-    /// deadline and the sample; promises are then kept [until its end](Assurance::until). Default `None`: a plan has to end
-    /// at an equilibrium. For plants without an equilibrium, such as an aeroplane, and for sets that move for ever. It is
-    /// tried to be prolonged before it ends.
+    /// Sets the time in s, finite, > 0, that a plan without an equilibrium at its end has to reach past the last deadline
+    /// and the sample. Promises are then kept [until the end of the plan](Assurance::until). Default `None`: a plan has to
+    /// end at an equilibrium. For plants without an equilibrium, such as an aeroplane, and for sets that move for ever. The
+    /// filter tries to prolong such a plan before it ends.
     #[must_use]
     pub fn horizon(self, horizon: impl Into<Option<f64>>) -> Self {
         Self { horizon: horizon.into(), ..self }
     }
 
-    /// Adds a policy with which a search for a plan begins: for promises that no search keeps by itself, such as a way
+    /// Adds a policy from which a search for a plan begins: for promises that no search keeps by itself, such as a passage
     /// through a gap. It writes the input at a time in s and a state, both those of the model.
     #[must_use]
     pub fn policy(mut self, policy: impl Fn(f64, &[f64], &mut [f64]) + Send + 'static) -> Self {
@@ -93,16 +94,18 @@ impl Plans {
         self
     }
 
-    /// Sets the most quadratic programs, > 0, of a search for a plan at one sample; it goes on at the next. A lost plan and one
-    /// behind u_ref are sought so. The first sample's search goes on to its end, as that of a sample that comes at another time
-    /// than was said, and that of a plan with a [horizon](Self::horizon).
+    /// Sets the largest number of quadratic programs, > 0, of a search for a plan at one sample; the search continues at the
+    /// next. It limits the searches for a lost plan and for one behind u_ref. Some searches run to their end regardless:
+    /// that of the first sample, of a sample that comes at another time than expected, and of a plan with a
+    /// [horizon](Self::horizon).
     #[must_use]
     pub fn search_budget(self, programs: u32) -> Self {
         Self { search_budget: programs, ..self }
     }
 
-    /// Says that the sets of each pair of barriers, by their numbers, have no state in common at any time. What needs both at
-    /// once is then refused without a search ([`Failure::Apart`](crate::plan::Failure::Apart)). Nothing else depends on it.
+    /// Declares that the sets of each pair of barriers, given by their numbers, have no state in common at any time.
+    /// Promises that need both at once are then refused without a search ([`Failure::Apart`](crate::plan::Failure::Apart)).
+    /// Nothing else depends on it.
     #[must_use]
     pub fn apart(self, pairs: Vec<[usize; 2]>) -> Self {
         Self { apart: pairs, ..self }
@@ -122,28 +125,29 @@ impl Plans {
 }
 
 impl Filter {
-    /// Has the filter promise only what a backup plan keeps. Its inputs are held for the period of `plans`.
+    /// Makes the filter promise only what a backup plan keeps. Its inputs are held for the period of `plans`.
     ///
-    /// At the first sample it searches for a plan from there, in the model and within the bounds. Found: every barrier that
-    /// [can be](Planning::promised) is promised, for whatever u_ref comes. Not found: the promise is refused, and the filter goes on
-    /// by its rows. Once promised, every input has a verified plan behind it. It is u_ref wherever a plan is found behind that; else a
-    /// compromise, once every set has been reached with the answer of the rows; or where nothing else keeps the promise the next input
-    /// of the plan itself.
+    /// At the first sample it searches for a plan from there, in the model and within the bounds. If one is found, every
+    /// barrier that [can be](Planning::promised) is promised, whatever u_ref comes. If none is found, the promise is
+    /// refused, and the filter continues by its rows. Once promised, every input has a verified plan behind it. The input is
+    /// u_ref wherever a plan is found behind that. Otherwise it is a compromise, with the answer of the rows once every set
+    /// has been reached; or, if nothing else keeps the promise, the next input of the plan itself.
     ///
-    /// Assumed: the plant is the model, its state is measured exactly, and samples are one period apart. Where the plant was seen to
-    /// differ, and by half as much again a set might be left before the next sample, the guarantee is lost for that sample.
-    /// A sample may be taken again at the same time, come sooner, or come late by a twentieth of a hold. Where the time to
-    /// the next sample changes and is [known](Self::expect_hold), a plan is sought for
-    /// the new one; none found ends the promise. A sample that comes later ends it until the next one. Where x is not finite, the
-    /// plan goes on as it is. A barrier without a deadline that [begins later](Begin::At) is promised from then on. A filter
-    /// with bounds on disturbance or measurement errors, a delay, or a deadline for what begins later cannot be assured yet, and
-    /// is refused. Sets must not move, unless [it is known](crate::barrier::Barrier::range_from) how low h
-    /// gets: at an equilibrium each is checked at eight later times, up to a day, and no plan is found where it has. With a
-    /// [horizon](Plans::horizon) they may, and the plant needs no equilibrium: the promise then has an
-    /// [end](Assurance::until), which is put off. States must be those of the plant, not of something that others move.
+    /// Assumptions: the plant is the model, its state is measured exactly, and samples are one period apart. If the plant
+    /// was seen to differ from the model, and 1.5 times that difference could take it out of a set before the next sample,
+    /// the guarantee is lost for that sample. A sample may be repeated at the same time, come early, or come late by a
+    /// twentieth of a hold. If the time to the next sample changes and is [known](Self::expect_hold), a plan is sought for
+    /// the new one; if none is found, the guarantee is lost. A sample that comes later suspends it until the next one. While
+    /// x is not finite, the plan continues as it is. A barrier without a deadline that [begins later](Begin::At) is promised
+    /// from then on. A filter with bounds on disturbance or measurement errors, a delay, or a deadline for a barrier that
+    /// begins later cannot be assured yet, and is refused. Sets must not move, unless [it is
+    /// known](crate::barrier::Barrier::range_from) how low h gets: at an equilibrium each set is checked at eight later
+    /// times, up to a day, and no plan is found if it has moved. With a [horizon](Plans::horizon) they may move, and the
+    /// plant needs no equilibrium: the promise then has an [end](Assurance::until), which is postponed again and again.
+    /// States must be those of the plant, not of something else that others move.
     ///
-    /// Plans account for the mean that a plant with an [integrator](Self::with_integrator) is given over each period, and keep the
-    /// limits of the integral. The search allocates, as do the plans.
+    /// Plans account for the mean that a plant with an [integrator](Self::with_integrator) receives over each period, and
+    /// keep the limits of the integral. The search allocates, and so do the plans.
     ///
     /// ```
     /// # use punctual_core::{barriers::DistanceDisc, filter::*};
@@ -163,10 +167,10 @@ impl Filter {
     ///
     /// # Errors
     ///
-    /// A number of `plans` out of range; a filter that has plans. A filter that cannot be assured: a barrier without a model to run ahead, or with
-    /// another plant than the first one; one with a deadline that begins later, one that begins on another's arrival, or
-    /// without a horizon one that moves for ever; a bound on disturbance or measurement errors; a delay. [`Self::obstacles`] lists them
-    /// all.
+    /// A number of `plans` out of range; a filter that already has plans. A filter that cannot be assured: a barrier without
+    /// a model that can be run ahead, or with another plant than the first one; one with a deadline that begins later, one
+    /// that begins on another's arrival, or without a horizon one that moves for ever; a bound on disturbance or measurement
+    /// errors; a delay. [`Self::obstacles`] lists them all.
     pub fn with_plans(mut self, plans: impl Into<Plans>) -> Result<Self, Error> {
         let plans = plans.into();
         plans.check()?;
@@ -184,7 +188,7 @@ impl Filter {
         Ok(self)
     }
 
-    /// Everything that keeps the filter from being given `plans`; nothing where [`Self::with_plans`] gives it them.
+    /// Every reason why the filter cannot have `plans`; empty if [`Self::with_plans`] accepts them.
     pub fn obstacles(&self, plans: &Plans) -> Vec<Error> {
         let mut found = Vec::new();
         let rows = &self.rows;
@@ -223,30 +227,31 @@ impl Filter {
         found
     }
 
-    /// Whether the promises are kept, and who chose the last input; `None` without plans.
+    /// Whether the promises are kept, and which source chose the last input; `None` without plans.
     pub fn assurance(&self) -> Option<&Assurance> {
         self.backup.as_ref().map(|backup| &backup.assurance)
     }
 
-    /// The plan that keeps the promises after the last step, where there is one.
+    /// The plan that keeps the promises after the last step, if there is one.
     pub fn plan(&self) -> Option<&BackupPlan> {
         self.backup.as_ref()?;
         self.rows.state.plan.backup_plan()
     }
 
-    /// The planner, to ask for plans; `None` for a filter without them.
+    /// The planner, for queries; `None` for a filter without plans.
     pub fn planning(&self) -> Option<Planning<'_>> {
         Some(self.backup.as_ref()?.planning((&self.rows, self.integrator.as_ref())))
     }
 
-    /// For how long in s the input at `t` is held if samples go on as they came: for as long as the one before, and where the
-    /// clock is not exact for a little longer than ever. A sample in between changes nothing, until eight in a row came as soon.
-    /// At first, and after [`Self::rearm`] at another time than was said, for the period. `None` without plans.
+    /// How long in s the input at `t` is held if samples continue as before: as long as the previous one, and with an
+    /// inexact clock slightly longer than any so far. A sample in between changes nothing until eight in a row came as soon.
+    /// The period at first, and after [`Self::rearm`] if the sample comes at another time than expected. `None` without
+    /// plans.
     pub fn usual_hold(&self, t: f64) -> Option<f64> {
         Some(self.rows.state.plan.usual_hold(t, self.backup.as_ref()?.period()))
     }
 
-    /// How long in s the last input was to be held, as far as it is known: without plans the sampling period that was measured.
+    /// How long in s the last input was to be held, as far as known; without plans, the measured sampling period.
     pub fn last_hold(&self) -> Option<f64> {
         match &self.backup {
             Some(_) => self.rows.state.plan.last_hold(),
@@ -255,19 +260,19 @@ impl Filter {
     }
 }
 
-/// The plans of a filter, and what was said of the last sample.
+/// The plans of a filter, and the assurance reported at the last sample.
 pub(super) struct Backup {
     plans: Plans,
-    /// The bounds of the model's inputs; of an integrated one those of a sample are tighter.
+    /// The bounds of the model's inputs; at a sample those of an integrated one are tighter.
     bounds: Bounds,
-    /// The sample that the reports are of.
+    /// The sample that the reports refer to.
     preview: Option<Preview>,
-    /// How the input of that sample moves with it.
+    /// How the input of that sample varies with it.
     piece: Piece,
     assurance: Assurance,
 }
 
-/// A sample that was looked at, its input, and that of the model.
+/// A sample that was computed ahead, its input, and the input of the model.
 struct Preview {
     t: f64,
     hold: f64,
@@ -290,18 +295,18 @@ impl Backup {
         Planning { rows, integrator, plans: &self.plans, bounds: &self.bounds }
     }
 
-    /// Whether a plan backs the step at `t`, so that rows need not be met.
+    /// Whether a plan backs the step at `t`, so that the rows need not be met.
     pub(super) fn is_behind(&self, plan: &PlanState, t: f64, hold: f64, integrates: bool) -> bool {
         plan.is_followed() && plan.lost.is_none() && plan.in_time(t, self.planned_hold(hold, integrates))
     }
 
-    /// The hold that plans count with where an input is held for `hold` s.
+    /// The hold that plans assume for an input that is held for `hold` s.
     fn planned_hold(&self, hold: f64, integrates: bool) -> f64 {
         let shortest = if integrates { SHORTEST_INTEGRATED } else { SHORTEST };
         hold.max(shortest * self.plans.period)
     }
 
-    /// Goes on from the answer `u` of the rows to that of the whole filter.
+    /// Turns the answer `u` of the rows into that of the whole filter.
     pub(super) fn sample(
         &mut self,
         (rows, integrator): (&mut Rows, Option<&Integrator>),
@@ -319,7 +324,7 @@ impl Backup {
         rows.workspace.report.assurance = Some(self.assurance);
     }
 
-    /// Writes the input of the sample that was looked at last, if it is the one with these arguments. Returns whether it did.
+    /// Writes the input of the last computed sample if it has these arguments. Returns whether it has.
     pub(super) fn recall(&mut self, t: f64, hold: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> bool {
         let preview = self.preview.take().filter(|preview| preview.is_at(t, hold, x, u_ref));
         if let Some(preview) = &preview {
@@ -329,7 +334,7 @@ impl Backup {
         self.preview.is_some()
     }
 
-    /// Notes the sample that the reports are of, with the input `u` of the plant and `inside` of the model.
+    /// Remembers the sample that the reports refer to, with the input `u` of the plant and `inside` of the model.
     pub(super) fn remember(
         &mut self,
         (t, hold): (f64, f64),
@@ -343,12 +348,12 @@ impl Backup {
         self.preview = Some(preview);
     }
 
-    /// Forgets the sample that was looked at; returns its input of the model.
+    /// Forgets the last computed sample; returns its input of the model.
     pub(super) fn forget(&mut self) -> Option<[f64; MAX_INPUTS]> {
         self.preview.take().map(|preview| preview.inside)
     }
 
-    /// Goes on from the memory `plan`.
+    /// Continues from the memory `plan`.
     pub(super) fn restart(&mut self, plan: &PlanState) {
         self.preview = None;
         let (status, failure) = (plan.status, plan.failure);
@@ -366,8 +371,8 @@ impl Backup {
         state.plan.check([rows.state_dim, rows.input_dim], rows.slots.len(), is_fresh, self.plans.horizon)
     }
 
-    /// Makes the derivative `out` of the answer of the rows that of the input that was given in its place, `inside` the model's.
-    /// Returns why it has none.
+    /// Turns the derivative `out` of the rows' answer into that of the input actually applied; `inside` is the model's.
+    /// Returns why there is none.
     pub(super) fn carry(
         &self,
         (rows, integrator): (&Rows, Option<&Integrator>),
@@ -398,14 +403,15 @@ impl Preview {
     }
 }
 
-/// A number that no model treats apart, for state `i` of a trial.
+/// A number for state `i` of a trial, at which no model has a special case.
 fn trial_state(i: usize, trial: usize) -> f64 {
     ((i * 37 + trial * 101 + 13) % 89) as f64 / 31.0 - 1.2
 }
 
-/// Whether h changes with time alone, at some states, and it is not known that it does so within limits. It is looked at at some
-/// times in s, and at all at once where it has enclosures.
+/// Whether h changes with time alone, at some states, and no bounds on that change are known. h is evaluated at a few times
+/// in s, and over all times at once if it has enclosures.
 fn leaves(slot: &BarrierSlot, states: usize) -> bool {
+    /// Times in s at which h is compared with its first value.
     const TIMES: [f64; 4] = [0.0, 0.7, 31.0, 4e3];
     let Some(model) = slot.source.predict() else { return false };
     (0..4).any(|trial| {
@@ -417,8 +423,9 @@ fn leaves(slot: &BarrierSlot, states: usize) -> bool {
     })
 }
 
-/// Checks that every barrier runs the same plant ahead, at some states: a plan is one of all of them.
+/// Checks at a few states that every barrier predicts the same plant: one plan serves all of them.
 fn one_plant(rows: &Rows, period: f64) -> Result<(), Error> {
+    /// Number of states at which the plants are compared.
     const TRIALS: usize = 4;
     let (nx, nu) = (rows.state_dim, rows.input_dim);
     let moved = |slot: &BarrierSlot, trial: usize| {

@@ -1,4 +1,5 @@
-//! What plans are about: the promises of the barriers along the plant, and how plans for them are found. Nothing here is remembered.
+//! The input to planning: the promises of the barriers along the plant, and how plans for them are found. Nothing here is
+//! remembered.
 
 use alloc::vec::Vec;
 
@@ -12,25 +13,26 @@ use crate::lie::Predict;
 use crate::plan::{BackupPlan, Failure, Integral, Limit, ON_TIME, Planner, Requirement, slopes};
 use crate::qp::Bounds;
 
-/// Margin of a plan, as a part of the size of h at the first sample: for what the model leaves out between two samples. No
-/// more than a part of the largest h there is: a small set that is far away has no room for it.
+/// Margin of a plan, as a part of the size of h at the first sample: for what the model leaves out between two samples.
 const MARGIN: f64 = 1e-4;
+/// The largest margin, as a part of the largest h there is: a small set that is far away has no room for more.
 const ROOM: f64 = 0.05;
-/// Its least size, as that of h where each state is moved so far, and by so much of itself: plans are no better resolved.
+/// The least margin: the change of h if each state moves by the first number (in its unit), plus the second as a part of its
+/// size. Plans are no better resolved.
 const RESOLVED: [f64; 2] = [1e-7, 64.0 * f64::EPSILON];
-/// Margin of the rows behind which plans are, in units of theirs.
+/// Margin of rows with plans behind them, in units of the margin of the plans.
 pub(super) const AMPLE: f64 = 2.0;
-/// The part of the time until the end of a plan after which it is tried again to be prolonged, where it was not.
+/// The part of the time until the end of a plan after which the filter tries again to prolong it, if that failed before.
 const SOONER: f64 = 0.25;
 
-/// The planner of a filter ([`Filter::planning`](crate::filter::Filter::planning)): its barriers along the plant, the integrator, and
-/// how plans are made. It remembers nothing of what it is asked.
+/// The planner of a filter ([`Filter::planning`](crate::filter::Filter::planning)): its barriers along the plant, the
+/// integrator, and how plans are made. It remembers no query.
 #[derive(Clone, Copy)]
 pub struct Planning<'a> {
     pub(super) rows: &'a Rows,
     pub(super) integrator: Option<&'a Integrator>,
     pub(super) plans: &'a Plans,
-    /// The bounds of the model's inputs; of an integrated one those of the rows are tighter.
+    /// The bounds of the model's inputs; in the rows those of an integrated one are tighter.
     pub(super) bounds: &'a Bounds,
 }
 
@@ -45,17 +47,17 @@ impl<'a> Planning<'a> {
         &self.rows.workspace.next.plan
     }
 
-    /// The model's state where `x` is measured.
+    /// The model's state for the measured `x`.
     pub(super) fn state(&self, x: &[f64]) -> Vec<f64> {
         self.with(x, self.rows.state.integrated)
     }
 
-    /// The direction of that state where the one measured moves along `dx`.
+    /// The direction of that state if the measured state moves along `dx`.
     pub(super) fn direction(&self, dx: &[f64]) -> Vec<f64> {
         self.with(dx, 0.0)
     }
 
-    /// `x` with `value` in the place of the integral.
+    /// `x` with `value` inserted for the integral.
     fn with(&self, x: &[f64], value: f64) -> Vec<f64> {
         let mut inside = x.to_vec();
         if let Some(own) = self.integrator {
@@ -65,7 +67,7 @@ impl<'a> Planning<'a> {
         inside
     }
 
-    /// `u_ref` as a wish for the model's input, and within its bounds.
+    /// `u_ref` as the input asked of the model, and that within its bounds.
     pub(super) fn wanted(&self, hold: f64, u_ref: &[f64]) -> ([f64; MAX_INPUTS], [f64; MAX_INPUTS]) {
         let mut wish = [0.0; MAX_INPUTS];
         wish[..u_ref.len()].copy_from_slice(u_ref);
@@ -76,14 +78,14 @@ impl<'a> Planning<'a> {
         (wish, core::array::from_fn(within))
     }
 
-    /// The direction of that wish where `u_ref` moves along `du_ref`.
+    /// The direction of that input within its bounds, as `u_ref` moves along `du_ref`.
     pub(super) fn moves(&self, hold: f64, u_ref: &[f64], du_ref: &[f64]) -> [f64; MAX_INPUTS] {
         let mut moves = [0.0; MAX_INPUTS];
         moves[..du_ref.len()].copy_from_slice(du_ref);
         if let Some(own) = self.integrator {
             moves[own.of.input] *= own.moves(self.rows.state.integrated, hold, u_ref[own.of.input]);
         }
-        // Beyond its bounds it moves nothing.
+        // Beyond its bounds an input does not move.
         let (wish, wanted) = self.wanted(hold, u_ref);
         for (moves, (wish, wanted)) in moves.iter_mut().zip(wish.iter().zip(&wanted)) {
             *moves = if wish == wanted { *moves } else { 0.0 };
@@ -91,12 +93,12 @@ impl<'a> Planning<'a> {
         moves
     }
 
-    /// The integral that the plant is given the mean of, if there is one.
+    /// The integral whose mean the plant receives, if there is one.
     fn integral(&self) -> Option<Integral> {
         self.integrator.map(|own| Integral { state: own.of.state, input: own.of.input })
     }
 
-    /// Every barrier along the plant, run ahead.
+    /// Every barrier along the plant, for prediction.
     pub(super) fn models(&self) -> impl Iterator<Item = &'a dyn Predict> + use<'a> {
         self.rows.slots.iter().filter_map(|slot| slot.source.predict())
     }
@@ -109,13 +111,13 @@ impl<'a> Planning<'a> {
         factor: impl Fn(&BarrierSlot) -> f64,
     ) -> Vec<Option<Promise>> {
         let promise = |(slot, model): (&BarrierSlot, &dyn Predict)| {
-            // Not that of the report, which has none where u_ref is no number.
+            // Not the h of the report, which is missing if u_ref is NaN.
             let h = model.value(t, x);
-            // A little earlier, so that round-off of a time is no gap.
+            // Slightly earlier, so that round-off of a time leaves no gap.
             let after = |seconds: f64| t + seconds - ON_TIME * self.plans.period;
             let from = match (slot.begin, slot.promise.settings().deadline) {
                 (Begin::At(begin), _) if begin > 0.0 => after(begin),
-                // NaN is asked for at once, and found by the check.
+                // NaN is required at once, so that the check finds it.
                 _ if h.is_nan() || h >= 0.0 => t,
                 (_, Some(deadline)) => after(factor(slot) * deadline),
                 (_, None) => return None,
@@ -128,16 +130,16 @@ impl<'a> Planning<'a> {
             let soft = matches!(slot.strictness, Strictness::Soft(_));
             let margin = margin(model, t, x, h);
             let firm = if from == t && h < AMPLE * margin { after(self.plans.period) } else { t };
-            // Half of the user's, so that a plan backs the rows, which aim at all of it.
+            // Half of the user's margin, so that a plan backs the rows, which aim at all of it.
             let reserve = slot.promise.settings().margin / AMPLE;
-            // What is kept from now on may be nearer to its edge.
+            // A set that is kept from now on may be nearer to its edge.
             let reserve = if from == t { reserve.min(h / AMPLE) } else { reserve };
             (!soft && until > from).then_some(Promise { from, until, margin, firm, reserve })
         };
         self.rows.slots.iter().zip(self.models()).map(promise).collect()
     }
 
-    /// `promises`, whose deadlines are `part` of the time from `t` that they were; what begins by itself stays.
+    /// `promises` with each deadline at `part` of its time from `t`. Promises with a begin of their own are unchanged.
     pub(super) fn sooner(&self, promises: &[Option<Promise>], t: f64, part: f64) -> Vec<Option<Promise>> {
         let sooner = |(promise, slot): (&Option<Promise>, &BarrierSlot)| {
             let mut promise = (*promise)?;
@@ -152,7 +154,7 @@ impl<'a> Planning<'a> {
         promises.iter().zip(&self.rows.slots).map(sooner).collect()
     }
 
-    /// `longest`, or the largest factor with which no deadline of those that `scales` picks comes after the end of its barrier.
+    /// `longest`, or the largest factor for which no deadline chosen by `scales` comes after the end of its barrier.
     pub(super) fn longest(&self, longest: f64, scales: impl Fn(&BarrierSlot) -> bool) -> f64 {
         let ends = self.rows.slots.iter().filter(|slot| scales(slot)).filter_map(|slot| {
             match (slot.end, slot.promise.settings().deadline) {
@@ -168,7 +170,7 @@ impl<'a> Planning<'a> {
         let slots = &self.rows.slots;
         self.plans.apart.iter().find_map(|&[a, b]| {
             let (p, q) = (promises.get(a).copied().flatten()?, promises.get(b).copied().flatten()?);
-            // What is let go on arrival has to be reached at some time until its deadline, and nobody says when.
+            // A set that is released on arrival has to be reached at some unknown time before its deadline.
             let [of_p, of_q] = [(a, p), (b, q)].map(|(i, promise)| match slots[i].end {
                 End::OnArrival => (t, promise.from + self.plans.period),
                 _ => (promise.from, promise.until),
@@ -196,7 +198,7 @@ impl<'a> Planning<'a> {
         })
     }
 
-    /// Runs `f` with the planner of `promises`, for samples that are `period` s apart.
+    /// Runs `f` with the planner for `promises`, for samples that are `period` s apart.
     pub(super) fn planned<R>(
         &self,
         promises: &[Option<Promise>],
@@ -227,7 +229,7 @@ impl<'a> Planning<'a> {
                 model: limit,
                 from,
                 until,
-                // What is kept at a limit is not missed by what no number tells from it.
+                // A value at the limit may differ from it by round-off.
                 margin: -0.25 * f64::EPSILON * limit.limit.abs(),
                 firm: t,
                 reserve: 0.0,
@@ -272,8 +274,8 @@ impl<'a> Planning<'a> {
         trajectory
     }
 
-    /// The time in s at which a plan that ends at `until` is next tried to be prolonged, at `t`: when it has become as short
-    /// as it may be, and then ever more often until its end.
+    /// The time in s at which the filter next tries to prolong a plan that ends at `until`, seen from `t`: when the plan has
+    /// become as short as allowed, and then more and more often until its end.
     pub(super) fn next_prolonging(&self, t: f64, until: f64) -> f64 {
         let Some(horizon) = self.plans.horizon else { return f64::INFINITY };
         let last = self.now().promises.iter().flatten().map(|promise| promise.from).fold(t, f64::max);
@@ -286,7 +288,7 @@ impl<'a> Planning<'a> {
     }
 }
 
-/// The margin that plans keep of a barrier that has the value `h` at `t` and `x`.
+/// The margin that plans keep for a barrier with the value `h` at `t` and `x`.
 fn margin(model: &dyn Predict, t: f64, x: &[f64], h: f64) -> f64 {
     let mut gradient = x.to_vec();
     slopes(model, t, x, &mut gradient);
@@ -298,9 +300,11 @@ fn margin(model: &dyn Predict, t: f64, x: &[f64], h: f64) -> f64 {
     if highest > 0.0 { wanted.min(ROOM * highest) } else { wanted }
 }
 
-/// The largest h found uphill from `x` at `t`, up to `enough`.
+/// The largest h found by climbing from `x` at `t`, up to `enough`.
 fn highest(model: &dyn Predict, t: f64, x: &[f64], enough: f64) -> f64 {
+    /// Largest number of steps uphill.
     const STEPS: u32 = 60;
+    /// Largest number of halvings of a step that does not climb.
     const HALVINGS: u32 = 30;
     let (mut x, mut gradient, mut next) = (x.to_vec(), x.to_vec(), x.to_vec());
     let mut h = model.value(t, &x);
@@ -315,7 +319,7 @@ fn highest(model: &dyn Predict, t: f64, x: &[f64], enough: f64) -> f64 {
             length *= 0.5;
             model.value(t, &next) > h
         });
-        // NaN leads nowhere.
+        // From NaN there is no way up.
         if h >= enough || !climbs {
             break;
         }

@@ -15,17 +15,17 @@ use crate::plan::{Failure, ON_TIME, Plan, Planner, SearchProgress, slopes};
 use crate::qp::Bounds;
 use crate::scalar::all_finite;
 
-/// What a plant may do beside the model in the next hold, in units of what it was seen to do in those before.
+/// How far the plant may deviate from the model in the next hold, in units of the deviation seen in earlier ones.
 const GUSTS: f64 = 1.5;
 
-/// A sample under way: the rows have answered, and plans decide.
+/// A sample in progress: the rows have answered, and the plans decide.
 pub(super) struct Decision<'a> {
     pub(super) rows: &'a mut Rows,
     pub(super) integrator: Option<&'a Integrator>,
     pub(super) plans: &'a Plans,
     pub(super) bounds: &'a Bounds,
     pub(super) assurance: &'a mut Assurance,
-    /// How the input of the sample moves with it.
+    /// How the input varies with the sample.
     pub(super) piece: &'a mut Piece,
 }
 
@@ -55,12 +55,12 @@ impl Decision<'_> {
         &mut self.rows.workspace.next.plan
     }
 
-    /// Goes on from the answer `u` of the rows, whose report and state are in the workspace, to that of the whole filter.
+    /// Turns the answer `u` of the rows, whose report and state are in the workspace, into that of the whole filter.
     pub(super) fn sample(&mut self, at: At<'_>, u_ref: &[f64], u: &mut [f64]) {
         let At { t, hold, x } = at;
         let Workspace { next, .. } = &mut self.rows.workspace;
         next.plan.clone_from(&self.rows.state.plan);
-        // Not by the status: u_ref may be no number.
+        // Not by the report's status: u_ref may be NaN.
         if next.plan.status == AssuranceStatus::Undecided && !next.is_armed(t, self.rows.arm_after) {
             (*self.assurance, *self.piece) = (Assurance::default(), Piece::ROWS);
             return;
@@ -74,7 +74,7 @@ impl Decision<'_> {
         }
         let mut is_regular = self.before().is_regular(t, hold);
         if self.now().status == AssuranceStatus::Undecided && is_valid {
-            // What is made at a sample is made for it.
+            // A plan made at a sample suits that sample.
             is_regular |= self.decide(at, u);
         } else if self.before().is_followed() {
             self.judge(at, is_valid);
@@ -111,9 +111,9 @@ impl Decision<'_> {
         }
     }
 
-    /// Decides at the first sample: what is promised, and whether a plan keeps it. Where none does, those barriers that are
-    /// [to take a later deadline](Infeasible::Earliest) get the earliest for which there is one. Whether the plan was made
-    /// here.
+    /// Decides at the first sample what is promised, and whether a plan keeps it. If none does, the barriers that [accept a
+    /// later deadline](Infeasible::Earliest) get the earliest one for which there is a plan. Returns whether the plan was
+    /// made here.
     fn decide(&mut self, At { t, hold, x }: At<'_>, u: &[f64]) -> bool {
         let planning = self.planning();
         let search = |promises, shorter: &[f64]| planning.first(promises, (t, hold), x, u, shorter);
@@ -154,8 +154,8 @@ impl Decision<'_> {
         }
     }
 
-    /// Starts the rows again at the first sample, with deadlines `factor` times as long where they yield. They keep more margin
-    /// than plans do, so that one backs their answer at the edge of a set too.
+    /// Restarts the rows at the first sample, with deadlines `factor` times as long for the barriers that accept this. The
+    /// rows keep more margin than the plans, so that a plan backs their answer at the edge of a set too.
     fn postpone(&mut self, t: f64, hold: f64, factor: f64) {
         let Rows { slots, state, workspace, .. } = &mut *self.rows;
         let Workspace { next, report, .. } = workspace;
@@ -172,7 +172,7 @@ impl Decision<'_> {
             slot.promise.anchor(state, t, &slot.now.derivatives.drift[..slot.degree()], deadline, hold);
             (state.arrival, state.gain, state.unmet) = (arrival, gain, unmet);
             if later {
-                // Once, whatever the rows had made of it.
+                // Once, whatever the rows made of it.
                 state.postponed = before.postponed + 1;
                 (b.time_left, b.deadline_unreachable) = (state.deadline, false);
             } else {
@@ -182,7 +182,7 @@ impl Decision<'_> {
         }
     }
 
-    /// Sees at `t` how far the plant is from where the model has led since the last sample; `x` where it is measured.
+    /// Compares the plant at `t` with where the model has led since the last sample. `x` is the state, if measured.
     fn see(&mut self, t: f64, x: Option<&[f64]>) {
         let before = self.before();
         let Some([last, _]) = before.sample.filter(|[last, _]| t > *last && before.is_followed()) else {
@@ -194,23 +194,23 @@ impl Decision<'_> {
             planner.run(&mut led, u);
             Ok(())
         });
-        // Of nothing that is promised nothing may be missed.
+        // If nothing is promised, nothing can be missed.
         if is_led.is_ok() {
             let period = self.plans.period;
             self.next().deviation.see(t, x, led, period);
         }
     }
 
-    /// Judges a promise that was followed: whether the sample came in time, and whether something was missed before it.
+    /// Judges a promise that was followed: whether the sample came in time, and whether anything was missed before it.
     fn judge(&mut self, At { t, hold, x }: At<'_>, is_valid: bool) {
-        // What came to its end was kept until then.
+        // A promise that expired was kept until then.
         let has_expired = self.before().status == AssuranceStatus::Expired;
         let lost = |status| if has_expired { AssuranceStatus::Expired } else { status };
         match (self.before().in_time(t, hold), is_valid.then(|| self.missed(t, x)).flatten()) {
             (true, None) if is_valid => self.end(AssuranceStatus::Assured, None),
             (true, None) => {}
             (false, None) => self.end(lost(AssuranceStatus::Irregular), None),
-            // For good.
+            // Lost for good.
             (_, failure) => {
                 self.end(lost(AssuranceStatus::Lost), failure);
                 self.next().promises.fill(None);
@@ -218,17 +218,17 @@ impl Decision<'_> {
         }
     }
 
-    /// What was or may have been missed until `t` since the last plan was followed, where the state is `x`: a set that is
+    /// What was missed, or may have been, until `t` since a plan was last followed, with the state at `x`: a set that was
     /// left, or a promise that began meanwhile.
     fn missed(&self, t: f64, x: &[f64]) -> Option<Failure> {
         let PlanState { status, sample, lost, .. } = self.before();
         let seen = sample.map_or(t, |[last, held]| match status {
             AssuranceStatus::Assured => last + held * (1.0 + JITTER),
-            // There was a plan, but for a plant that differs.
+            // There was a plan, but for a plant that deviates from the model.
             AssuranceStatus::Lost if lost.is_none() => last + held * (1.0 + JITTER),
             _ => last,
         });
-        // A promise is about all times: what is measured again is not what was promised.
+        // A promise covers all times: the same time measured again was not promised.
         if t <= seen + 2.0 * f64::EPSILON * t.abs() {
             return None;
         }
@@ -236,7 +236,7 @@ impl Decision<'_> {
         promises.enumerate().find_map(|(barrier, (promise, model))| {
             let Promise { from, until, .. } = (*promise)?;
             let h = model.value(t, x);
-            // One that begins with this sample is seen at it.
+            // A promise that begins at this sample is checked now.
             let begins = t - 2.0 * ON_TIME * self.plans.period;
             match from <= t && t < until {
                 // NaN counts as outside.
@@ -247,7 +247,7 @@ impl Decision<'_> {
         })
     }
 
-    /// Ends the promise of each set that was let go on arrival.
+    /// Ends the promise of each set that was released on arrival.
     fn release(&mut self) {
         let Rows { slots, workspace: Workspace { next, report, .. }, .. } = &mut *self.rows;
         for ((promise, slot), b) in next.plan.promises.iter_mut().zip(slots).zip(&report.barriers) {
@@ -257,8 +257,7 @@ impl Decision<'_> {
         }
     }
 
-    /// What may be missed until the next sample under `u`, where the plant goes on to differ from the model as it was
-    /// seen to.
+    /// What may be missed before the next sample under `u`, if the plant continues to deviate from the model as observed.
     fn exposed(&self, At { t, hold, x }: At<'_>, u: &[f64]) -> Option<Failure> {
         let mut promises = self.now().promises.clone();
         let differs = self.now().deviation.after(hold, x)?;
@@ -283,13 +282,13 @@ impl Decision<'_> {
         (next.status, next.failure) = (status, failure);
     }
 
-    /// Sets when the current plan is next tried to be prolonged.
+    /// Sets when the filter next tries to prolong the current plan.
     fn prolong_next(&mut self, t: f64) {
         let at = self.planning().next_prolonging(t, self.now().plan.backup_plan.until);
         self.next().prolong_at = at;
     }
 
-    /// Looks for a plan that ends later than the current one, where it is time to.
+    /// Looks for a plan that ends later than the current one, if it is due.
     fn prolong(&mut self, At { t, hold, x }: At<'_>, u: &[f64]) {
         let PlanState { promises, plan, prolong_at, .. } = self.now();
         if t < *prolong_at {
@@ -306,8 +305,8 @@ impl Decision<'_> {
         self.prolong_next(t);
     }
 
-    /// Chooses the input, `u` of the rows at first, and remembers what is behind it. `is_regular` tells whether the plan is one for
-    /// this sample.
+    /// Chooses the input and remembers the plan behind it. `u` first holds the answer of the rows. `is_regular` says whether
+    /// the plan was made for this sample.
     fn choose(&mut self, at: At<'_>, u_ref: &[f64], u: &mut [f64], is_regular: bool) -> Driver {
         self.prolong(at, u);
         let At { t, hold, x } = at;
@@ -344,17 +343,17 @@ impl Decision<'_> {
         }
     }
 
-    /// Looks for another plan where the current one keeps the promises no more, for the reason `failure`.
+    /// Looks for another plan if the current one no longer keeps the promises, for the reason `failure`.
     fn regain(&mut self, at: At<'_>, failure: Failure, u: &mut [f64], is_regular: bool) -> Driver {
         let At { t, hold, x } = at;
-        // A plan that ends at an equilibrium is sought by a few steps a sample, where samples come as they are to.
+        // A plan that ends at an equilibrium is sought by a few steps per sample, if samples come as expected.
         let is_spread = is_regular && !self.now().plan.is_finite();
         let (mut regained, mut goes_on) = (self.now().regained.clone(), false);
         let (planning, plan) = (self.planning(), &self.now().plan);
         let found = match self.before().lost {
             Some([_, next]) if t < next => Err(failure),
             _ => {
-                // One that is lost is found again without its reserve.
+                // A lost plan is sought without its reserve.
                 let mut promises = self.now().promises.clone();
                 promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);
                 planning.planned(&promises, (t, hold), u, |planner| match is_spread {
@@ -381,7 +380,7 @@ impl Decision<'_> {
                 Driver::Plan
             }
             Err(longer) => {
-                // A plan that has come to its end was kept.
+                // A plan that has expired was kept.
                 let is_at_its_end = next.plan.backup_plan.until <= t + 0.5 * hold;
                 let PlanState { status, lost, .. } = *self.before();
                 let (status, failure) = match is_regular {
@@ -391,7 +390,7 @@ impl Decision<'_> {
                     false => (AssuranceStatus::Irregular, failure),
                 };
                 self.end(status, Some(failure));
-                // Ever more seldom, since a search is long.
+                // Less and less often, since a search takes long.
                 if lost.is_none_or(|[_, next]| t >= next) {
                     let since = lost.map_or(t, |[since, _]| since);
                     let pause = if goes_on { 0.0 } else { (t - since).max(hold).max(self.plans.period) };
@@ -402,8 +401,8 @@ impl Decision<'_> {
         }
     }
 
-    /// Where the promise is lost: the input of the plan's law, where that nearly keeps it from here; else the answer of the
-    /// rows.
+    /// The input once the guarantee is lost: that of the plan's law if it nearly keeps the promise from here, otherwise the
+    /// answer of the rows.
     fn come_near(&mut self, At { t, hold, x }: At<'_>, u: &mut [f64]) -> Driver {
         let nearly = |planner: &Planner<'_>| planner.nearly(&self.now().plan, t, x);
         match self.planning().planned(&self.now().promises, (t, hold), u, nearly) {
@@ -416,12 +415,12 @@ impl Decision<'_> {
         }
     }
 
-    /// Goes on with the plan as it is, where nobody knows where the plant is.
+    /// Continues with the plan as it is while the state of the plant is unknown.
     fn go_on(&mut self, At { t, hold, .. }: At<'_>, u: &mut [f64]) -> Driver {
         let plan = &self.now().plan;
         let inputs = &plan.backup_plan.inputs;
         let next = inputs.iter().find(|(end, _)| *end > t + 0.5 * hold);
-        // Past its end, an equilibrium that only feedback holds is left.
+        // Past its end, the plant leaves an equilibrium that only feedback holds.
         let is_over = next.is_none() && !plan.stays();
         if let Some((_, input)) = next.or(inputs.last()) {
             for (i, u) in u.iter_mut().enumerate() {
@@ -437,8 +436,8 @@ impl Decision<'_> {
         Driver::Plan
     }
 
-    /// Rewrites report and state of the rows, which answered `rows`, for the input `u` actually applied. It has a plan behind it
-    /// where the promise is assured.
+    /// Rewrites report and state of the rows, which answered `rows`, for the input `u` actually applied. If the guarantee
+    /// holds, a plan is behind `u`.
     fn report_on(&mut self, rows: &[f64], u: &[f64]) {
         let (driver, is_assured) = (self.assurance.driver, self.assurance.is_assured());
         let Workspace { next, report, .. } = &mut self.rows.workspace;
@@ -464,7 +463,7 @@ impl Decision<'_> {
                 (b.on_course, state.on_course) = (false, false);
                 b.slack = b.row.slack(u);
             }
-            // Plans count from the first state, rows from the first sample that is whole: a promise may end before its row.
+            // Plans count from the first state, rows from the first complete sample: a promise may end before its row.
             let stands = promise.as_ref().is_some_and(|promise| report.time < promise.until);
             if is_assured && stands && b.phase != Phase::Released {
                 b.guaranteed = true;

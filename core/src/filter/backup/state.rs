@@ -10,45 +10,48 @@ use crate::plan::{BackupPlan, Failure, ON_TIME, Plan, SearchProgress};
 
 /// The largest round-off of a time, as a part of the period.
 const ROUND_OFF: f64 = 1e-2;
-/// What is kept in hand for the next time where a clock was not exact, as a part of a hold; and how many intervals in a row that are
-/// so much shorter, alike to [`JITTER`], are the new usual ones.
+/// Part of a hold added to the next one if the clock was not exact.
 const HEADROOM: f64 = 0.02;
+/// Longest interval that counts as shorter than usual, as a part of a hold.
 const QUICKER: f64 = 0.9;
+/// Number of such intervals in a row, equal to within [`JITTER`], that become the new usual ones.
 const ALIKE: u32 = 8;
 
-/// The part of a [`FilterState`](crate::filter::FilterState) that is of plans: the promises and the plan that keeps them.
+/// The part of a [`FilterState`](crate::filter::FilterState) that belongs to plans: the promises and the plan that keeps
+/// them.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PlanState {
     /// Status of the guarantee.
     pub status: AssuranceStatus,
-    /// Why there is no plan, where the promise was refused or lost.
+    /// Why there is no plan, if the promise was refused or the guarantee lost.
     pub(super) failure: Option<Failure>,
-    /// One of each barrier; `None` where nothing is promised, or no more.
+    /// One per barrier; `None` if nothing is promised, or nothing any longer.
     pub(super) promises: Vec<Option<Promise>>,
-    /// The plan; while nothing is decided, one from before [`Filter::rearm`](crate::filter::Filter::rearm).
+    /// The plan; before the decision, one from before [`Filter::rearm`](crate::filter::Filter::rearm).
     pub(super) plan: Plan,
-    /// Where the plan was lost: when, in s, and when another one is next searched for.
+    /// If the plan was lost: when, in s, and when another one is next searched for.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub(super) lost: Option<[f64; 2]>,
-    /// The search for another one.
+    /// The search for another plan.
     pub(super) regained: SearchProgress,
-    /// The part of the last input that was the plan's, beside the answer of the rows; 0 where no plan was needed.
+    /// The plan's share of the last input, beside u_ref or the answer of the rows; 0 if no plan was needed.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub(super) share: f64,
-    /// What is comfortable, and when a plan is next sought behind u_ref.
+    /// What is comfortable, and when a plan behind u_ref is next sought.
     pub(super) memory: ChoiceMemory,
-    /// The time in s at which a plan that ends is next tried to be prolonged.
+    /// The time in s at which the filter next tries to prolong a plan that ends.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub(super) prolong_at: f64,
     /// Time of the last sample in s, and how long its input was to be held.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub(super) sample: Option<[f64; 2]>,
-    /// The time in s between the last two samples, and how many intervals in a row have been like it; 0 before there is one.
+    /// The time in s between the last two samples, and how many intervals in a row have been about as long; 0 before there
+    /// is one.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub(super) interval: f64,
     pub(super) alike: u32,
-    /// What the plant was seen to do beside the model since the promise was given.
+    /// The deviation of the plant from the model, observed since the promise was given.
     pub(super) deviation: Deviation,
 }
 
@@ -64,7 +67,7 @@ impl PlanState {
         }
     }
 
-    /// Notes a sample at `t`, whose input is to be held for `hold` s.
+    /// Records a sample at `t`, whose input is to be held for `hold` s.
     pub(super) fn note(&mut self, t: f64, hold: f64) {
         if let Some([last, _]) = self.sample
             && t > last
@@ -76,7 +79,7 @@ impl PlanState {
         self.sample = Some([t, hold]);
     }
 
-    /// Forgets what was promised. A plan that was followed for it is kept to go on with, and when the last sample was.
+    /// Forgets what was promised. Keeps a plan that was followed, to continue with it, and the time of the last sample.
     pub(crate) fn rearm(&mut self) {
         let Self { status, promises, plan, sample, interval, alike, .. } = core::mem::take(self);
         let is_over = |[t, _]: [f64; 2]| promises.iter().flatten().all(|promise| promise.until <= t);
@@ -90,7 +93,7 @@ impl PlanState {
         }
     }
 
-    /// The plan that keeps the promises, where there is one.
+    /// The plan that keeps the promises, if there is one.
     pub(super) fn backup_plan(&self) -> Option<&BackupPlan> {
         (self.status == AssuranceStatus::Assured).then_some(&self.plan.backup_plan)
     }
@@ -116,8 +119,8 @@ impl PlanState {
         }
     }
 
-    /// Whether a sample at `t` comes no later than the one before said, but for a clock that is measured, and times tell samples
-    /// apart.
+    /// Whether a sample at `t` comes no later than the previous one announced, allowing for a measured clock, and whether
+    /// times are precise enough to distinguish samples.
     pub(super) fn in_time(&self, t: f64, hold: f64) -> bool {
         let Some([last, held]) = self.sample else { return false };
         let round_off = 2.0 * f64::EPSILON * t.abs();
@@ -126,7 +129,7 @@ impl PlanState {
         last <= t && t <= last + held + late && round_off <= ROUND_OFF * hold.min(held)
     }
 
-    /// Whether the sample at `t` is one for which the plan was made.
+    /// Whether the plan was made for the sample at `t`.
     pub(super) fn is_regular(&self, t: f64, hold: f64) -> bool {
         let PlanState { plan, sample, .. } = self;
         sample.is_some_and(|[last, held]| {
@@ -137,8 +140,8 @@ impl PlanState {
         })
     }
 
-    /// Checks a memory that is to be restored into a filter with `dims` states and inputs of the model and so many `barriers`, before
-    /// its first sample if it `is_fresh`.
+    /// Checks a memory to be restored into a filter with `barriers` barriers, whose model has as many states and inputs as
+    /// `dims` says. `is_fresh`: the filter has had no sample yet.
     ///
     /// # Errors
     ///
@@ -217,15 +220,15 @@ pub(super) struct Promise {
     pub(super) until: f64,
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub(super) margin: f64,
-    /// From when in s it has to be there: what begins at the edge of its set has a period to leave it.
+    /// From when in s the margin has to be there: a state that begins at the edge of a set has a period to leave the edge.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub(super) firm: f64,
-    /// What new plans keep, ≥ 0: a reserve where it is more than the margin.
+    /// What new plans keep, ≥ 0: a reserve if it exceeds the margin.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub(super) reserve: f64,
 }
 
-/// Whether two intervals of a clock that is measured are meant to be the same.
+/// Whether two intervals of a measured clock are meant to be the same.
 pub(super) fn is_like(interval: f64, other: f64) -> bool {
     (interval - other).abs() <= JITTER * other
 }

@@ -1,29 +1,29 @@
-//! What a filter with plans says of a step: whether its promises are kept, who chose the input, and why.
+//! The report of a filter with plans on a step: whether its promises are kept, which source chose the input, and why.
 
 use crate::plan::Failure;
 
-/// Who chose the input of a step.
+/// The source of the input of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Driver {
-    /// u_ref, with a comfortable plan behind it: the current one, that moved in time, or another.
+    /// u_ref, with a comfortable plan behind it: the current one, the current one moved in time, or another.
     Reference,
-    /// The rows of the filter inside, with a plan behind their answer; or the rows alone, where there is no promise.
+    /// The rows of the filter, with a plan behind their answer; or the rows alone, if nothing is promised.
     #[default]
     Rows,
-    /// As near to u_ref as its bounds, or the rows and a comfortable plan, allow.
+    /// The nearest input to u_ref that its bounds, or the rows and a comfortable plan, allow.
     Eased,
-    /// A compromise between the plan's own input and u_ref, or the answer of the rows where every set has been reached, or an input
-    /// that does not jump from the last one; with a plan behind it.
+    /// A compromise with a plan behind it: between the plan's own input and u_ref, or the answer of the rows once every set
+    /// has been reached; or an input that does not jump from the last one.
     Between,
     /// The plan: nothing else keeps the promise.
     Plan,
 }
 
-/// Where the promise of a filter with [plans](super::Plans) stands. The numbers are stable: they leave the library as the FMU's
-/// `assurance`.
+/// Status of the guarantee of a filter with [plans](super::Plans). The numbers are stable: they leave the library as the
+/// FMU's `assurance`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
@@ -35,15 +35,15 @@ pub enum AssuranceStatus {
     Undecided = 0,
     /// Every promise is kept: there is a backup plan.
     Assured = 1,
-    /// Refused at the first sample: no plan was found. The filter goes on by its rows, without promise.
+    /// Refused at the first sample: no plan was found. The filter continues by its rows, without a promise.
     Refused = 2,
-    /// Was assured, and is not now: the plant is not where the model predicted. Until something promised is missed the
+    /// Was assured, and is not now: the plant is not where the model predicted. Until something promised is missed, the
     /// guarantee is regained at the first sample from which a plan keeps it.
     Lost = 3,
-    /// Was assured, and is not now: a sample came later than the hold of the one before, or earlier and no plan was found
-    /// from there. It is regained as one that was lost, after a late sample at the next one in time.
+    /// Was assured, and is not now: a sample came later than the previous hold, or earlier without a plan from there. The
+    /// guarantee is regained as after a loss; after a late sample, at the next one in time.
     Irregular = 4,
-    /// Was assured until a time, which has come: no plan was found beyond it. It is regained as one that was lost.
+    /// Was assured until a time that has come: no plan was found beyond it. The guarantee is regained as after a loss.
     Expired = 5,
 }
 
@@ -52,12 +52,12 @@ impl AssuranceStatus {
     pub const ALL: [Self; 6] =
         [Self::Undecided, Self::Assured, Self::Refused, Self::Lost, Self::Irregular, Self::Expired];
 
-    /// Its name, as the FMU's enumeration has it.
+    /// Its name, as in the FMU's enumeration.
     pub fn name(self) -> &'static str {
         self.words().0
     }
 
-    /// Its meaning, in a few words.
+    /// Its meaning, in brief.
     pub fn meaning(self) -> &'static str {
         self.words().1
     }
@@ -76,8 +76,8 @@ impl AssuranceStatus {
     }
 }
 
-/// Why u_ref was changed: with it held until the next sample, and the plan followed then, this barrier would be broken, or come
-/// nearest to its edge where that is merely uncomfortable.
+/// Why u_ref was changed. If it were held until the next sample, and the plan followed from then on, this barrier would be
+/// broken; or, if that is merely uncomfortable, it would come nearest to its edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Reason {
@@ -88,23 +88,23 @@ pub struct Reason {
     pub time: f64,
 }
 
-/// What a filter with plans says of a step ([`Report::assurance`](crate::filter::Report::assurance)).
+/// The report of a filter with plans on a step ([`Report::assurance`](crate::filter::Report::assurance)).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub struct Assurance {
     /// Status of the guarantee.
     pub status: AssuranceStatus,
-    /// Who chose the input.
+    /// The source of the input.
     pub driver: Driver,
-    /// Why there is no plan, where the promise was refused or lost, or has come to its end.
+    /// Why there is no plan, if the promise was refused, or the guarantee was lost or has expired.
     pub failure: Option<Failure>,
-    /// The time in s until which every promise is kept, infinite for ever; `None` where nothing is assured. Once given, it
-    /// never goes back.
+    /// The time in s until which every promise is kept, infinite for ever; `None` if nothing is assured. Once given, it
+    /// never moves back.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub until: Option<f64>,
-    /// Why u_ref was changed, as seen when it last passed no more; `None` where it was not, or for its bounds alone, or where
-    /// nothing is assured.
+    /// Why u_ref was changed, as determined when it last ceased to pass; `None` if it was not changed, or only by its
+    /// bounds, or if nothing is assured.
     pub reason: Option<Reason>,
 }
 

@@ -1,8 +1,8 @@
-//! Bounded errors of the measured state: what they can do to the derivatives of h and to a row over the period.
+//! Bounded errors of the measured state: their effect on the derivatives of h and on a row over the period.
 //!
-//! Everything is a smooth function F of the state. To first order |F(x̂) − F(x)| ≤ Σ_i ε_i |∂F/∂x_i|, with the
-//! derivatives at the measured state (`docs/theory.md#measured-state`). For a row over the period these depend on u,
-//! so the row is no longer affine: it is linearised with the rest.
+//! Every quantity is a smooth function F of the state. To first order |F(x̂) − F(x)| ≤ Σ_i ε_i |∂F/∂x_i|, with the
+//! derivatives at the measured state (`docs/theory.md#measured-state`). For a row over the period these depend on u, so the
+//! row is no longer affine: they are linearised together with it.
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -41,17 +41,17 @@ impl MeasurementErrors {
         Self { state_dim, directions }
     }
 
-    /// Whether there are none.
+    /// Whether there are no errors.
     pub(crate) fn is_exact(&self) -> bool {
         self.directions.is_empty()
     }
 
-    /// Number of states that have one.
+    /// Number of states with an error.
     pub(crate) fn count(&self) -> usize {
         self.directions.len() / self.state_dim
     }
 
-    /// Bounds on the errors of h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ at `t` and `x`; their parts along each error to `slopes`. Not finite where
+    /// Bounds on the errors of h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ at `t` and `x`. Writes their parts along each error to `slopes`. Not finite if
     /// the derivatives are not.
     pub(crate) fn of_derivatives(
         &self,
@@ -66,7 +66,7 @@ impl MeasurementErrors {
         let (mut change, mut sum) = (Ahead::ZERO, [0.0; MAX_RELATIVE_DEGREE]);
         let known = source.directional();
         for (direction, slopes) in self.directions.chunks_exact(self.state_dim).zip(slopes) {
-            // Derivatives of order below n contain no input.
+            // Derivatives of order below n do not depend on the input.
             if let Some(source) = known {
                 source.evaluate_directional(t, x, zeros, Direction { x: direction, u: zeros }, &mut change);
             }
@@ -78,8 +78,8 @@ impl MeasurementErrors {
         sum
     }
 
-    /// The largest error of the row over the period of `bound`, divided by its divisor, from t, x, u and the time
-    /// ahead. `None` where that is not finite.
+    /// The largest error of the row over the period of `bound`, divided by its divisor, from t, x, u and the time ahead.
+    /// `None` if it is not finite.
     pub(crate) fn of_row(
         &self,
         source: &dyn DerivativeSource,
@@ -111,8 +111,8 @@ impl MeasurementErrors {
     }
 }
 
-/// What h may fall short of its prediction by: errors η_j of h⁽ʲ⁾ at the sample, and a disturbance of h⁽ⁿ⁾ from there on up to
-/// W. τ s later it is Σ_{j<n} η_j τʲ/j! + W τⁿ/n!, exactly so where h is linear and the plant a chain of integrators
+/// How far h may fall short of its prediction: errors η_j of h⁽ʲ⁾ at the sample, and a disturbance of h⁽ⁿ⁾ of up to W from
+/// there on. After τ s it is Σ_{j<n} η_j τʲ/j! + W τⁿ/n!. This is exact if h is linear and the plant a chain of integrators
 /// (`docs/theory.md#between-samples`).
 #[derive(Clone, Copy)]
 pub(crate) struct Shortfall {
@@ -122,7 +122,7 @@ pub(crate) struct Shortfall {
 }
 
 impl Shortfall {
-    /// `None` where nothing is off.
+    /// `None` if there is neither an error nor a disturbance.
     #[inline]
     pub(crate) fn new(errors: &[f64], disturbance: f64, delay: f64) -> Option<Self> {
         if disturbance == 0.0 && errors.iter().all(|error| *error == 0.0) {
@@ -137,12 +137,12 @@ impl Shortfall {
         Some(Self { coefficients, delay })
     }
 
-    /// The part of the disturbance of h⁽ⁿ⁾ in it, `at` s after the input begins to act.
+    /// The part that the disturbance of h⁽ⁿ⁾ contributes, `at` s after the input begins to act.
     pub(crate) fn of_disturbance(&self, n: usize, at: f64) -> f64 {
         (0..n).fold(self.coefficients[n], |product, _| product * (at + self.delay))
     }
 
-    /// It, and its slope, `at` s after the input begins to act.
+    /// The shortfall and its slope, `at` s after the input begins to act.
     pub(crate) fn at(&self, at: f64) -> [f64; 2] {
         let after = at + self.delay;
         self.coefficients
@@ -152,7 +152,7 @@ impl Shortfall {
     }
 }
 
-/// Whether `source` gives derivatives along a direction, a moment ahead too.
+/// Whether `source` gives derivatives along a direction, including those of its predictions.
 pub(crate) fn check(source: &dyn DerivativeSource) -> Result<(), Error> {
     if source.directional().is_some() && source.predict_directional().is_some() {
         return Ok(());
@@ -161,7 +161,7 @@ pub(crate) fn check(source: &dyn DerivativeSource) -> Result<(), Error> {
     Err(Error::new(ErrorKind::Unsupported, "measurement_errors", message))
 }
 
-/// Whether a filter with these barriers can allow for errors, and tells the barriers.
+/// Whether a filter with these barriers can allow for errors. Sets this in the barriers.
 pub(crate) fn check_all(slots: &mut [BarrierSlot], sampling: Sampling, delay: f64) -> Result<(), Error> {
     let refuse = |message: String| Err(Error::new(ErrorKind::Unsupported, "measurement_errors", message));
     if sampling == Sampling::Pointwise {

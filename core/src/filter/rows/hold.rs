@@ -1,38 +1,39 @@
 //! h between two samples, while an input is held (`docs/theory.md#between-samples`).
 //!
 //! Let η(σ) = h(t + σ) along the model under the held input, less what disturbances and errors may take off. The model walks
-//! through the hold in parts, and η and η̇ are read between them. From instants σ_1 < σ_2 < σ_3 the cubic through the outer two
-//! predicts η and η̇ at the middle one. Its error there bounds what the cubics of the two halves leave open: less than an
-//! eighth of it where η is smooth (their error is max|η⁗| σ⁴/384 on a length σ), twice it at a kink. The walk is repeated in
-//! twice as many parts. It ends when that bound, and what two walks differ by, decide whether h ≥ 0.
+//! through the hold in parts, and η and η̇ are read between them. From instants σ_1 < σ_2 < σ_3 the cubic through the outer
+//! two predicts η and η̇ at the middle one. Its error there bounds the error of the cubics of the two halves. That is less
+//! than an eighth of it where η is smooth (their error is max|η⁗| σ⁴/384 on a length σ), and twice it at a kink. The walk is
+//! repeated in twice as many parts. It ends when that bound, and the difference of two walks, decide whether h ≥ 0.
 //!
-//! What is narrower than a part does not show in a walk. So η is enclosed too, where the source can: far from 0 on the whole
-//! hold, which does without a walk ([`Hold::floor`]), else after the walk, part by part.
+//! A dip narrower than a part does not show in a walk. So η is also enclosed, if the source can do so: either far from 0 on
+//! the whole hold, which makes a walk unnecessary ([`Hold::floor`]), or after the walk, part by part.
 //!
-//! The parts are not even, so that no motion of the set, however fast, looks like rest at all instants. What [`MOST`]
-//! parts cannot decide counts as h < 0, such as an input that turns the plant by a hundred radians within the hold.
+//! The parts differ in length, so that no motion of the set, however fast, looks like standstill at all instants. If
+//! [`MOST`] parts cannot decide, this counts as h < 0: for example under an input that turns the plant by a hundred radians
+//! within the hold.
 
 use super::errors::Shortfall;
 use crate::MAX_RELATIVE_DEGREE;
 use crate::elementary;
 use crate::lie::Predict;
 
-/// Parts of the first walk.
+/// Number of parts of the first walk.
 const FEWEST: usize = 4;
 
-/// Parts of the last walk.
+/// Number of parts of the last walk.
 const MOST: usize = 64;
 
-/// Error of a cubic anywhere over its error in the middle, at most. Where η has a fourth derivative the ratio is less
-/// than 1; at a kink, such as the path past a small disc, it is 2. The difference of two walks counts as often: where
+/// Largest ratio of the error of a cubic anywhere to its error in the middle. If η has a fourth derivative, the ratio is
+/// less than 1; at a kink, such as the path past a small disc, it is 2. The difference of two walks gets the same factor: if
 /// they do not resolve a turn, both are off.
 const UNSURE: f64 = 4.0;
 
-/// Equal parts of a hold on which η is enclosed, one number after the other until that decides.
+/// Numbers of equal parts of a hold on which η is enclosed, tried in turn until one decides.
 const SHARPER: [u32; 4] = [1, 4, 16, 64];
 
-/// What an enclosure may leave open beside a walk, as a part of what η varies by on it. Where η is smooth, and turns where it is
-/// 0, four parts leave a quarter of it and sixteen a sixty-fourth.
+/// What an enclosure may leave open beside a walk, as a part of the variation of η on it. If η is smooth, and turns where it
+/// is 0, four parts leave a quarter of it and sixteen a sixty-fourth.
 const LEFT_OPEN: f64 = 0.125;
 
 /// η and η̇ at an instant.
@@ -65,25 +66,25 @@ impl Lowest {
 
 /// The path of h under one held input.
 pub(super) struct Hold<'a> {
-    /// `None` where the source cannot predict.
+    /// `None` if the source cannot predict.
     pub(super) source: Option<&'a dyn Predict>,
     pub(super) t: f64,
     pub(super) x: &'a [f64],
     pub(super) u: &'a [f64],
-    /// What is taken off the predicted h.
+    /// What is subtracted from the predicted h.
     pub(super) shortfall: Option<&'a Shortfall>,
 }
 
 impl Hold<'_> {
-    /// A number that η does not fall below until `to`, narrow things included; at its sharpest where it is negative. `None` where
-    /// the source has no enclosures.
+    /// A lower bound on η until `to`, including narrow dips; as sharp as possible if it is negative. `None` if the source
+    /// has no enclosures.
     pub(super) fn floor(&self, to: f64) -> Option<f64> {
         let short = self.short(to);
         self.source?.lowest_held(self.t, self.x, self.u, to, short).map(|h| h - short)
     }
 
-    /// Where η may be negative between `from` and `to` though it `varies` by little at all instants looked at, by a lower bound
-    /// on it; `None` where it is not, and where nothing bounds it.
+    /// Where η may be negative between `from` and `to`, by a lower bound on it, although a walk found no negative value; it
+    /// `varies` by this much over the walk. `None` if it is not negative, or if nothing bounds it.
     fn narrow(
         &self,
         source: &dyn Predict,
@@ -110,13 +111,13 @@ impl Hold<'_> {
         lowest.h.is_finite().then_some(lowest)
     }
 
-    /// What is taken off h at an instant.
+    /// What is subtracted from h at an instant.
     fn short(&self, at: f64) -> f64 {
         self.shortfall.map_or(0.0, |shortfall| shortfall.at(at)[0])
     }
 
-    /// A lower bound on η over `from` ≤ σ ≤ `to` (seconds after the sample), and where; `scratch` has the length
-    /// of the state. `None` where the source cannot predict.
+    /// A lower bound on η over `from` ≤ σ ≤ `to` (seconds after the sample), and where; `scratch` has the length of the
+    /// state. `None` if the source cannot predict.
     pub(super) fn lowest(&self, from: f64, to: f64, scratch: &mut [f64]) -> Option<Lowest> {
         let (mut coarse, mut fine) = ([Node::ZERO; MOST + 1], [Node::ZERO; MOST + 1]);
         let mut parts = FEWEST;
@@ -149,7 +150,7 @@ impl Hold<'_> {
         }
     }
 
-    /// h⁽⁰⁾ … h⁽ⁿ⁾ at an instant (s after the sample); `None` where the source cannot predict.
+    /// h⁽⁰⁾ … h⁽ⁿ⁾ at an instant (s after the sample); `None` if the source cannot predict.
     pub(super) fn derivatives(&self, at: f64) -> Option<[f64; MAX_RELATIVE_DEGREE + 1]> {
         self.source.map(|source| self.ahead(source, self.x, 0.0, at))
     }
@@ -193,14 +194,15 @@ impl Hold<'_> {
 /// A value above every other.
 const LARGEST: Lowest = Lowest { h: f64::INFINITY, at: 0.0 };
 
-/// End number `k` of so many `parts`, whose lengths grow from 0.8 to 1.2 times the mean.
+/// The end of part `k` of `parts`, whose lengths grow from 0.8 to 1.2 times the mean.
 fn instant([from, to]: [f64; 2], k: usize, parts: usize) -> f64 {
+    /// Difference of the first and the last part from the mean length, as a part of it.
     const UNEVEN: f64 = 0.2;
     let z = k as f64 / parts as f64;
     if k == parts { to } else { from + (to - from) * z * (1.0 - UNEVEN * (1.0 - z)) }
 }
 
-/// The least value of the cubics between three instants, and the error in the middle of the one through the outer two.
+/// The least value of the cubics between three instants, and the error at the middle one of the cubic through the outer two.
 fn dips(&[a, middle, b]: &[Node; 3]) -> (Lowest, f64) {
     let length = b.at - a.at;
     if length <= 0.0 {
@@ -224,7 +226,7 @@ fn dip(a: Node, b: Node) -> Lowest {
     let (c, d) = (3.0 * rise - 2.0 * left - right, left + right - 2.0 * rise);
     let mut lowest = Lowest { h: a.h, at: a.at }.or(Lowest { h: b.h, at: b.at });
     let root = elementary::sqrt((c * c - 3.0 * d * left).max(0.0));
-    // The two zeros of the slope, in the form that does not cancel.
+    // The two zeros of the slope, in the form without cancellation.
     let sum = -(c + root.copysign(c));
     for s in [sum / (3.0 * d), left / sum] {
         if s > 0.0 && s < 1.0 {

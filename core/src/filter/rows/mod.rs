@@ -39,7 +39,7 @@ pub(super) struct Workspace {
     pub(super) requirements: Vec<Requirement>,
     /// The state after the sample.
     pub(super) next: FilterState,
-    /// Room for one state.
+    /// Space for one state.
     pub(super) scratch: Vec<f64>,
     pub(super) report: Report,
     pub(super) search: Scratch,
@@ -53,21 +53,21 @@ pub(super) struct Rows {
     pub(super) input_dim: usize,
     pub(super) slots: Vec<BarrierSlot>,
     pub(super) bounds: Bounds,
-    /// Whether an input has a bound: without any nothing is ruled out.
+    /// Whether any input has a bound: without one, nothing is ruled out.
     pub(super) bounded: bool,
     pub(super) correction_limit: f64,
     pub(super) sampling: Sampling,
     pub(super) delay: f64,
     pub(super) errors: MeasurementErrors,
-    /// The period in s that [`Sampling::Measured`] starts from.
+    /// The period in s with which [`Sampling::Measured`] starts.
     pub(super) first_period: f64,
-    /// The longest time in s between two samples, 0 where it is not given.
+    /// The longest time in s between two samples, 0 if it is not given.
     pub(super) period_max: f64,
     /// The time in s from the first sample until the filter is armed.
     pub(super) arm_after: f64,
-    /// The time in s for which the next input will be held, where it is known.
+    /// The time in s for which the next input will be held, if known.
     pub(super) expected: Option<f64>,
-    /// Whether a plan backs the next step, so that rows need not be met.
+    /// Whether a plan backs the next step, so that the rows need not be met.
     pub(super) is_backed: bool,
     /// The memory of the filter, of which the rows use their part.
     pub(super) state: FilterState,
@@ -75,7 +75,8 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    /// Whether the input bounds certainly do not allow h ≥ 0 of barrier number `index` at `after` s after `t` and the state `x`.
+    /// Whether it is certain that the input bounds do not allow h ≥ 0 of barrier number `index` at `after` s after `t` and
+    /// `x`.
     pub(super) fn is_ruled_out(&self, index: usize, (t, x): (f64, &[f64]), after: f64) -> bool {
         let slot = self.slots.get(index).filter(|slot| slot.is_undisturbed());
         slot.is_some_and(|slot| reach::ruled_out(&*slot.source, (t, x), &self.bounds, after, 1.0))

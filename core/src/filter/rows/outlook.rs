@@ -10,7 +10,7 @@ use crate::elementary::dot;
 use crate::qp::Row;
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
-/// The part of h that must be left for it to be far from its edge.
+/// The part of h that must be left for h to count as far from its edge.
 const CLEAR: f64 = 0.5;
 
 /// The evolution of h until the next sample, as the derivatives at a sample predict it.
@@ -19,14 +19,14 @@ pub(super) struct Outlook<'a> {
     pub(super) n: usize,
     /// h⁽⁰⁾ … h⁽ⁿ⁻¹⁾, then L_fⁿh.
     pub(super) drift: &'a [f64; MAX_RELATIVE_DEGREE + 1],
-    /// What h may fall short of it by.
+    /// How far h may fall short of it.
     pub(super) shortfall: Option<&'a Shortfall>,
-    /// h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ so many seconds later under the held input, by the model, where they are known.
+    /// h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ that many seconds later under the held input, by the model, if known.
     pub(super) known: Option<(f64, &'a [f64; MAX_RELATIVE_DEGREE])>,
 }
 
-/// From when until when (s after the sample at `t`) a promise has h ≥ 0 while an input is held for `hold` s, if it has
-/// within them. In a set that is kept, the hold may last as `long` (s).
+/// The interval (s after the sample at `t`) on which a promise requires h ≥ 0 while an input is held for `hold` s, if there
+/// is one. In a set that is kept, the hold may last as long as `long` (s).
 #[inline(always)]
 pub(super) fn span(promise: &FixedTimeState, t: f64, [hold, long]: [f64; 2]) -> Option<[f64; 2]> {
     match promise.phase {
@@ -105,7 +105,7 @@ impl Outlook<'_> {
     ) -> Option<Lowest> {
         /// Round-off, as a part of the size of h.
         const ROUND_OFF: f64 = 1e-12;
-        // What is left at the end of the hold is the least: a shortfall grows.
+        // The value at the end of the hold is the least: a shortfall grows.
         let h = self.drift[0] - self.short(hold);
         let highest = self.drift[N] + dot(normal, held.u);
         let is_far = h > 0.0 && self.moved::<N>(highest, hold) <= (1.0 - CLEAR) * h;
@@ -117,14 +117,14 @@ impl Outlook<'_> {
         let lowest = held
             .lowest(from, hold, scratch)
             .unwrap_or_else(|| self.lowest_of_polynomial(highest, from, hold));
-        // NaN keeps no promise.
+        // NaN does not keep a promise.
         (lowest.h < -ROUND_OFF * size || lowest.h.is_nan()).then_some(lowest)
     }
 
-    /// Whether the derivatives at the end of the hold, where h is far from its edge, are those predicted: for sources
-    /// without enclosures. So are they where known ones before are, as far as what they are off by grows with the power n +
-    /// 1 of the time. With n = 1 a set that moves faster than the samples shows in no derivative that is known here; a turn
-    /// by radians shows where the hold ends.
+    /// Whether the derivatives at the end of the hold, where h is far from its edge, are as predicted: for sources without
+    /// enclosures. They count as such if known earlier ones are, provided that the error grows with the power n + 1 of the
+    /// time. With n = 1, a set that moves faster than the samples shows in no derivative that is known here; a turn by
+    /// radians shows at the end of the hold.
     #[inline(always)]
     fn agrees<const N: usize>(&self, held: &Hold, highest: f64, h: f64, hold: f64) -> bool {
         if N == 1 {
@@ -141,7 +141,7 @@ impl Outlook<'_> {
         held.derivatives(hold).is_none_or(|end| self.is_near::<N>(&end[..=N], hold, highest, allowed))
     }
 
-    /// Whether `derivatives` of h are those predicted `s` seconds later, but for what moves h by so much `allowed`.
+    /// Whether `derivatives` of h are as predicted `s` seconds later, up to an effect on h of `allowed`.
     #[inline(always)]
     fn is_near<const N: usize>(&self, derivatives: &[f64], s: f64, highest: f64, allowed: f64) -> bool {
         let mut power = 1.0;
@@ -153,6 +153,7 @@ impl Outlook<'_> {
 
     /// The lowest h without a model, to the order n.
     fn lowest_of_polynomial(&self, highest: f64, from: f64, to: f64) -> Lowest {
+        /// Number of intervals between the instants examined.
         const INSTANTS: u32 = 16;
         let at = |i: u32| from + (to - from) * f64::from(i) / f64::from(INSTANTS);
         (0..=INSTANTS)
@@ -160,8 +161,8 @@ impl Outlook<'_> {
             .fold(Lowest { h: f64::INFINITY, at: from }, Lowest::or)
     }
 
-    /// The requirement that keeps the promise of `barrier` at the instant at which it is broken. There is none for
-    /// the sample itself.
+    /// The requirement that keeps the promise of `barrier` at the instant at which it is broken. There is none for the
+    /// sample itself.
     pub(super) fn requirement(
         &self,
         barrier: usize,
@@ -171,13 +172,13 @@ impl Outlook<'_> {
         let ahead = lowest.map(|lowest| lowest.at).filter(|at| *at > 0.0)?;
         let mut weights = [0.0; MAX_RELATIVE_DEGREE];
         weights[0] = 1.0;
-        // Errors of the measurement are in every row over a time.
+        // Measurement errors are part of every row over a time.
         let floor = self.disturbed(ahead) + self.aim(promise, ahead);
         let bound = PeriodBound { weights, floor, ..PeriodBound::ZERO };
         Some(Requirement::new(barrier, bound, ahead, self.n))
     }
 
-    /// The h that is aimed at that instant.
+    /// The h aimed at for that instant.
     fn aim(&self, promise: &FixedTimeState, ahead: f64) -> f64 {
         match promise.phase {
             Phase::Stay => 0.5 * promise.margin.min(self.drift[0] - self.disturbed(ahead)).max(0.0),
@@ -185,7 +186,7 @@ impl Outlook<'_> {
         }
     }
 
-    /// The derivative of the floor of [`Self::requirement`] where h moves by `dh` and the margin by `margin`.
+    /// The derivative of the floor of [`Self::requirement`] as h moves by `dh` and the margin by `margin`.
     pub(super) fn aim_change(&self, promise: &FixedTimeState, ahead: f64, margin: f64, dh: f64) -> f64 {
         match promise.phase {
             Phase::Stay if self.aim(promise, ahead) <= 0.0 => 0.0,
@@ -195,7 +196,7 @@ impl Outlook<'_> {
         }
     }
 
-    /// What the disturbance takes off h until then.
+    /// What the disturbance subtracts from h until then.
     fn disturbed(&self, ahead: f64) -> f64 {
         self.shortfall.map_or(0.0, |shortfall| shortfall.of_disturbance(self.n, ahead))
     }

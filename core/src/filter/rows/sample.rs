@@ -10,13 +10,13 @@ use crate::error::{Error, length};
 use crate::qp::{Enforcement, Outcome, Problem, Solution};
 use crate::{MAX_INPUTS, MAX_ROWS};
 
-/// Most times that a sample adds the instants at which its answer breaks a promise, and is solved again.
+/// How many times at most a sample adds the instants at which its answer breaks a promise, and is solved again.
 const ROUNDS: u32 = 3;
 
-/// Steps that look far around for an input where they do not meet a constraint: the first 8 in a row, then every 16th.
+/// Steps that search widely for an input if they do not meet a constraint: the first 8 in a row, then every 16th.
 const WIDE: (u32, u32) = (8, 16);
 
-/// Largest distance from u_ref to which an added instant may move the input, over the largest of the distance before,
+/// Largest distance from u_ref to which an added instant may move the input, in units of the largest of the distance before,
 /// |u_ref| and 1.
 const MUCH_FURTHER: f64 = 4.0;
 
@@ -30,7 +30,7 @@ pub(crate) struct Moment<'a> {
     pub(crate) begin: f64,
     pub(crate) x: &'a [f64],
     pub(crate) u_ref: &'a [f64],
-    /// The period in s that the rows look over, `None` for the pointwise constraint.
+    /// The period in s that the rows look over; `None` for the pointwise constraint.
     pub(crate) period: Option<f64>,
     /// The longest time in s that the input is expected to be held.
     pub(crate) hold: f64,
@@ -38,12 +38,12 @@ pub(crate) struct Moment<'a> {
     pub(crate) long: f64,
     /// Whether the period is measured.
     pub(crate) measures: bool,
-    /// Whether an input has a bound: without any nothing is ruled out.
+    /// Whether any input has a bound: without one, nothing is ruled out.
     pub(crate) bounded: bool,
 }
 
 impl Moment<'_> {
-    /// The hold in s that margins and rates account for, 0 for the pointwise constraint.
+    /// The hold in s that margins and rates account for; 0 for the pointwise constraint.
     pub(crate) fn covered(&self) -> f64 {
         self.period.map_or(0.0, |_| self.hold)
     }
@@ -99,12 +99,12 @@ impl Rows {
         }
     }
 
-    /// Evaluates every barrier, moves its promise to the sample, and forms its row
-    /// (docs/theory.md, sections 1 and 6 to 8). Where not all have a row over the period, none is required.
+    /// Evaluates every barrier, moves its promise to the sample, and forms its row (docs/theory.md, sections 1 and 6 to 8).
+    /// If not all have a row over the period, none is required.
     ///
     /// # Errors
     ///
-    /// Derivatives or a row that are no constraint.
+    /// Derivatives or a row that cannot carry a constraint.
     fn rows(&mut self, moment: &Moment) -> Result<(), Status> {
         let acting = if self.delay > 0.0 { self.acting() } else { [0.0; MAX_INPUTS] };
         let Workspace { next, report, requirements, search, .. } = &mut self.workspace;
@@ -148,8 +148,7 @@ impl Rows {
         Ok(())
     }
 
-    /// Asks for (S) at the end of the longest step too, where that is longer than the period
-    /// (docs/theory.md, section 7).
+    /// Requires (S) at the end of the longest step too, if that is longer than the period (docs/theory.md, section 7).
     fn require_longest(&mut self, moment: &Moment) {
         let Workspace { next, report, requirements, .. } = &mut self.workspace;
         if report.period <= 0.0 || self.period_max <= report.period * (1.0 + SAME_PERIOD) {
@@ -163,7 +162,7 @@ impl Rows {
         }
     }
 
-    /// Solves. Where h would break its promise between the samples, solves again with that instant as a row
+    /// Solves. If h would break its promise between the samples, solves again with that instant as a row
     /// (`docs/theory.md#between-samples`).
     fn solve(&mut self, moment: &Moment, u: &mut [f64]) -> Solution {
         let listed = self.workspace.requirements.len();
@@ -172,13 +171,13 @@ impl Rows {
             let solution = self.solve_once(moment, listed, u);
             let breaks = self.look(moment, u);
             // An answer that is too far out does not count: an input that turns the plant by many radians makes any
-            // prediction true.
+            // prediction come true.
             let distance =
                 || u.iter().zip(moment.u_ref).fold(0.0, |d: f64, (v, r)| elementary::hypot(d, v - r));
             let met = matches!(solution.outcome, Outcome::Optimal)
                 && (allowed == f64::INFINITY || distance() <= allowed);
             if self.workspace.requirements.len() > listed && !met {
-                // That instant cannot be had as well: solve without it, and the report says so.
+                // That instant cannot be met as well: solve without it; the report says so.
                 self.workspace.requirements.truncate(listed);
                 round = ROUNDS;
                 continue;
@@ -197,8 +196,8 @@ impl Rows {
         }
     }
 
-    /// Solves the QP: over the period where all barriers have a row of it and a model to predict with
-    /// (`docs/theory.md#prediction`), else pointwise. The first `listed` requirements begin from the pointwise rows.
+    /// Solves the QP: over the period if all barriers have a row over it and a model to predict with
+    /// (`docs/theory.md#prediction`), otherwise pointwise. The first `listed` requirements start from the pointwise rows.
     fn solve_once(&mut self, moment: &Moment, listed: usize, u: &mut [f64]) -> Solution {
         let Workspace { rows, enforcement, requirements, report, search, qp, .. } = &mut self.workspace;
         search.clear();
@@ -208,7 +207,7 @@ impl Rows {
             for (i, requirement) in requirements.iter().enumerate() {
                 enforcement[i] = self.slots[requirement.barrier].now.enforcement;
             }
-            // Where rows have not been met for some steps, looking far around at every one would find nothing new.
+            // If rows have not been met for some steps, a wide search at every step would find nothing new.
             let widens =
                 |b: &FixedTimeState| b.unmet.is_none_or(|u| u.steps < WIDE.0 || u.steps % WIDE.1 == 0);
             let problem = PeriodProblem {
@@ -231,7 +230,7 @@ impl Rows {
                 return solution;
             }
         }
-        // Pointwise, where there is no row over the period or no prediction.
+        // Pointwise, if there is no row over the period or no prediction.
         report.predicted = false;
         for (i, slot) in self.slots.iter().enumerate() {
             (rows[i], enforcement[i]) = (slot.now.row, slot.now.enforcement);
@@ -241,7 +240,7 @@ impl Rows {
         qp.solve(&Problem { enforcement: &enforcement[..count], ..problem }, u)
     }
 
-    /// Looks at every instant until the next sample under the held input `u`. Returns whether a promise is broken at one.
+    /// Checks every instant until the next sample under the held input `u`. Returns whether a promise is broken at one.
     fn look(&mut self, moment: &Moment, u: &[f64]) -> bool {
         let Workspace { next, scratch, search, .. } = &mut self.workspace;
         let mut breaks = false;
@@ -268,7 +267,7 @@ impl Rows {
         breaks
     }
 
-    /// Asks for the instants at which the answer breaks a promise. Returns whether there are any.
+    /// Requires the instants at which the answer breaks a promise. Returns whether there are any.
     fn require_instants(&mut self) -> bool {
         let Workspace { next, requirements, .. } = &mut self.workspace;
         let before = requirements.len();
@@ -279,8 +278,8 @@ impl Rows {
         requirements.len() > before
     }
 
-    /// Reports the step, and notes for each promise whether it was met and is still guaranteed
-    /// (docs/theory.md, section 7).
+    /// Reports the step, and records for each promise whether it was met and is still guaranteed (docs/theory.md, section
+    /// 7).
     fn report_on(&mut self, moment: &Moment, solution: Solution, u: &[f64]) {
         let Workspace { next, report, rows, requirements, search, qp, .. } = &mut self.workspace;
         if moment.measures && self.state.time.is_some_and(|last| moment.t > last) {
@@ -298,7 +297,7 @@ impl Rows {
             Outcome::IllConditioned => Status::NoAuthority,
             Outcome::Failed => Status::SolverFailed,
         };
-        // Each barrier: its slack, its loss, and whether its guarantee goes on.
+        // Each barrier: its slack, its loss, and whether its guarantee continues.
         let (status, predicted) = (report.status, report.predicted);
         let mut blocked = false;
         for (i, slot) in self.slots.iter().enumerate().filter(|(_, slot)| slot.now.in_force) {
@@ -324,7 +323,7 @@ impl Rows {
         }
     }
 
-    /// Notes the first sample, where the filter is armed later. A sample before it is the first of another run.
+    /// Records the first sample, if the filter is armed later. A sample before it is the first of another run.
     #[inline]
     fn note_start(&mut self, t: f64) {
         let start = &mut self.workspace.next.start;
@@ -333,7 +332,7 @@ impl Rows {
         }
     }
 
-    /// Lets u_ref pass within its bounds: the filter is not armed yet.
+    /// Lets u_ref pass within its bounds, since the filter is not armed yet.
     fn wait(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) {
         let Workspace { next, report, .. } = &mut self.workspace;
         report.status = Status::NotArmed;
@@ -348,11 +347,11 @@ impl Rows {
         next.input[..u.len()].copy_from_slice(u);
     }
 
-    /// Enforces nothing and gives the admissible input nearest 0. Promises stay as they were, but lose their guarantee.
+    /// Enforces nothing and returns the admissible input nearest 0. Promises stay as they were, but lose their guarantee.
     fn abstain(&mut self, status: Status, u: &mut [f64]) {
         let Workspace { next, report, .. } = &mut self.workspace;
         report.status = status;
-        // What has begun to count goes on: the deadlines too, where the inputs were valid.
+        // Clocks that have started continue; so do deadlines, if the inputs were valid.
         let start = next.start;
         let starts: [Option<f64>; MAX_ROWS] = core::array::from_fn(|i| next.barriers.get(i)?.start_time);
         next.clone_rows_from(&self.state);
@@ -373,7 +372,7 @@ impl Rows {
     pub(super) fn acting(&self) -> [f64; MAX_INPUTS] {
         match self.state.time {
             Some(_) => self.state.input,
-            // That of a step that was not armed, or else 0.
+            // That of a step that was not armed, or otherwise 0.
             None => core::array::from_fn(|i| self.bounds.clamp(i, self.state.input[i])),
         }
     }

@@ -1,32 +1,31 @@
 //! The rows over the sampling period, and the search for an input that meets them.
 //!
-//! The row of the pointwise constraint is affine in u. Its integral over the period ([`crate::convergence::sampled`])
-//! is not, because the state at the end of the period depends on u through the plant. Newton's method on the rows
-//! solves it: linearise at the present guess, solve the QP, and go towards its answer. Each step goes as far as
-//! the violation of the rows that the QP does not give up decreases, halving the way. Only rows that are active or
-//! violated are linearised again. The others keep their last linearisation, at first the pointwise row. All are
-//! evaluated where the search ends.
+//! The row of the pointwise constraint is affine in u. Its integral over the period ([`crate::convergence::sampled`]) is
+//! not, because the state at the end of the period depends on u through the plant. Newton's method on the rows solves it:
+//! linearise at the present guess, solve the QP, and go towards its answer. Each step goes as far as the violation
+//! decreases, halving its length; rows that the QP gives up do not count. Only rows that are active or violated are
+//! linearised again. The others keep their last linearisation, at first the pointwise row. All are evaluated where the
+//! search ends.
 //!
-//! Mostly one row is active and all but affine, and its point nearest to u_ref is found at once (`curved_row`). With several, a
-//! few corrections from u_ref find the answer (`correction`). Where they do not, there
-//! are two guesses to start from: the answer of the pointwise rows, and the input of the step before. The
-//! better result is taken, by the number of rows given up, then by violation, then by distance from u_ref. The second
-//! guess matters where the row nearly vanishes, as for a vehicle across the line of sight. It carries the turn
-//! that was begun on through the instants at which the linearisation cannot see it. It is left out where the first
-//! has met every row by full steps that became shorter tenfold each, and is no further from u_ref than the last input
-//! is. The rows are all but affine there, and the answer is the only one near. Answers that differ by round-off count
-//! as equal, so a sample taken again gives the same bits.
+//! Usually one row is active and almost affine, and its point nearest to u_ref is found at once (`curved_row`). With several
+//! rows, a few corrections from u_ref find the answer (`correction`). If they do not, there are two guesses to start from:
+//! the answer of the pointwise rows, and the input of the previous step. The better result is used, judged by the number of
+//! rows given up, then by violation, then by distance from u_ref. The second guess matters if the row nearly vanishes, as
+//! for a vehicle across the line of sight: it continues the turn that was begun, through the instants at which the
+//! linearisation cannot see it. It is left out if the first guess met every row by full steps that each became ten times
+//! shorter, and is no further from u_ref than the last input. The rows are then almost affine there, and the answer is the
+//! only one nearby. Answers that differ by round-off count as equal, so a repeated sample gives the same bits.
 //!
-//! An answer is settled where its steps contracted like that, or where both guesses end at it. Two answers are not
-//! settled. One is far out against u_ref, where the plant turns and other answers exist. The other has room sideways:
-//! the row that u_ref violates leaves more room there than the way costs. A vehicle that brakes straight ahead where
-//! it could turn to either side is at rest between two such answers. So a master that takes a step again, or cuts it
-//! in two, gets the same input. From any answer that is not settled, above all from one that does not meet the rows,
-//! the module `wide` searches on. Its answer takes the place only if it meets all hard rows and is nearer, so what is
-//! right keeps its bits. Rows that cannot be met together are given up as the QP says, by priority.
+//! An answer is settled if its steps contracted like that, or if both guesses lead to it. Two kinds of answers are not
+//! settled. One is far from u_ref, where the plant turns and other answers exist. The other has room sideways: the row that
+//! u_ref violates leaves more room there than the way costs. A vehicle that brakes straight ahead, though it could turn to
+//! either side, stands still between two such answers. So a master that repeats a step, or divides it in two, gets the same
+//! input. From any answer that is not settled, above all from one that does not meet the rows, the module `wide` searches
+//! on. Its answer is used only if it meets all hard rows and is nearer, so a correct answer keeps its bits. Rows that cannot
+//! be met together are given up as the QP says, by priority.
 //!
-//! Violations are round-off where they are small against the terms that h and its derivatives are made of. They are not
-//! compared with what is left of these: on the boundary of 10 − p ≥ 0 that is round-off itself.
+//! A violation counts as round-off if it is small against the terms that h and its derivatives are made of. It is not
+//! compared with the sum of these terms: on the boundary of 10 − p ≥ 0 that is round-off itself.
 
 mod correction;
 mod curved_row;
@@ -53,17 +52,17 @@ const MET: f64 = 1e-9;
 const ROUND_OFF: f64 = 1e-12;
 /// Answers that differ by no more than this, as a part of their size, count as one.
 const SAME: f64 = 1e-6;
-/// Distance from u_ref beyond which an answer is not settled, over the size of u_ref and the last input, or 1.
+/// Distance from u_ref beyond which an answer is not settled, in units of the size of u_ref and the last input, or of 1.
 const FAR: f64 = 8.0;
 /// Distance sideways of an answer at which a nearer one is looked for, as a part of its distance from u_ref.
 const SIDEWAYS: f64 = 0.5;
-/// Linearisations per guess, and halvings of the way to the answer of one of them.
+/// Linearisations per guess, and halvings of the way to the answer of one linearisation.
 const PATIENT: [u32; 2] = [12, 8];
-/// The same where a plan backs the step: what is found with more of them is seldom better than the plan.
+/// The same if a plan backs the step: what more of them would find is seldom better than the plan.
 const BACKED: [u32; 2] = [4, 2];
-/// The part of the foretold decrease that must come true.
+/// The part of the predicted decrease that must come true.
 const SUFFICIENT: f64 = 0.3;
-/// Largest ratio of each step of a search to the one before, for its answer to be the only one near.
+/// Largest ratio of each step of a search to the one before, for its answer to be the only one nearby.
 const CONTRACTION: f64 = 0.1;
 
 /// The requirement on one barrier at one instant ahead.
@@ -75,25 +74,25 @@ pub(crate) struct Requirement {
     pub(crate) bound: PeriodBound,
     /// The time in s until that instant, finite, > 0.
     pub(crate) ahead: f64,
-    /// The divisor that makes h⁽ʲ⁾ at the end comparable with a row on h⁽ⁿ⁾, where j is the highest order that the
-    /// bound weighs: h⁽ⁿ⁾ held for the duration δ changes h⁽ʲ⁾ by δⁿ⁻ʲ/(n − j)! times itself. For j = n − 1 it is δ.
+    /// The divisor that makes h⁽ʲ⁾ at the end comparable with a row on h⁽ⁿ⁾, where j is the highest order that the bound
+    /// weighs: h⁽ⁿ⁾ held for the duration δ changes h⁽ʲ⁾ by δⁿ⁻ʲ/(n − j)! times itself. For j = n − 1 it is δ.
     pub(crate) divisor: f64,
 }
 
 impl Requirement {
-    /// The requirement `ahead` s on, of a barrier of relative degree `n`.
+    /// The requirement `ahead` s from now, of a barrier of relative degree `n`.
     pub(crate) fn new(barrier: usize, bound: PeriodBound, ahead: f64, n: usize) -> Self {
         let order = bound.weights[..n].iter().rposition(|w| *w != 0.0).unwrap_or(0);
         let divisor = (1..=n - order).fold(1.0, |product, i| product * (ahead / i as f64));
         Self { barrier, bound, ahead, divisor }
     }
 
-    /// Whether it is on h alone at an instant, not (S), whose floor contains what h is now.
+    /// Whether it bounds h alone at an instant. Otherwise it is (S), whose floor contains the present h.
     pub(crate) fn is_instant(&self) -> bool {
         self.bound.decay == 0.0
     }
 
-    /// The derivative of its row where the derivatives at that instant move by `change` and the bound stays.
+    /// The derivative of its row as the derivatives at that instant move by `change` and the bound stays.
     pub(crate) fn change(&self, change: &Ahead, n: usize, inputs: usize) -> Weighted {
         let homogeneous = PeriodBound { floor: 0.0, ..self.bound };
         homogeneous.weighted(&change.value[..n], &change.gradient, inputs, self.divisor)
@@ -114,11 +113,11 @@ pub(crate) struct PeriodProblem<'a> {
     pub(crate) enforcement: &'a [Enforcement],
     pub(crate) correction_limit: f64,
     pub(crate) errors: &'a MeasurementErrors,
-    /// Whether to look far around for an input where the pointwise rows cannot be met either.
+    /// Whether to search widely for an input if the pointwise rows cannot be met either.
     pub(crate) widens: bool,
-    /// Whether a plan backs the step, so that rows need not be met.
+    /// Whether a plan backs the step, so that the rows need not be met.
     pub(crate) is_backed: bool,
-    /// How the only active row of the sample before was curved.
+    /// The curvature of the only active row of the previous sample.
     pub(crate) curvature: Option<&'a Curvature>,
 }
 
@@ -127,7 +126,7 @@ pub(crate) struct Scratch {
     violations: [f64; MAX_ROWS],
     pub(crate) evaluations: Evaluations,
     predicted: Predicted,
-    /// How the only active row of the last answer curves, where the search knows it.
+    /// The curvature of the only active row of the last answer, if the search knows it.
     pub(crate) curvature: Option<Curvature>,
 }
 
@@ -142,24 +141,24 @@ impl Scratch {
         (self.predicted.rows, self.curvature) = (RowSet::EMPTY, None);
     }
 
-    /// h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ at the instant of requirement `i` under `u`; the rest means nothing. `None` where the search has not
-    /// predicted it last.
+    /// h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ at the instant of requirement `i` under `u`; the rest is meaningless. `None` if this is not the
+    /// search's last prediction.
     pub(crate) fn predicted(&self, i: usize, u: &[f64]) -> Option<&[f64; MAX_RELATIVE_DEGREE]> {
         let Predicted { rows, input, values } = &self.predicted;
         (rows.contains(i) && *u == input[..u.len()]).then(|| &values[i])
     }
 }
 
-/// Room for the evaluations of the sources.
+/// Memory for the evaluations of the sources.
 pub(crate) struct Evaluations {
     /// The last prediction.
     ahead: Ahead,
     pub(crate) plants: SharedPlants,
 }
 
-/// What the predictions at one input have been.
+/// The predictions at one input.
 struct Predicted {
-    /// The requirements that they are of.
+    /// The requirements that were predicted.
     rows: RowSet,
     input: [f64; MAX_INPUTS],
     /// h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ at the instant of each.
@@ -190,7 +189,7 @@ impl Linearised<'_> {
         (0..self.rows.len()).filter(kept).fold(0.0, |w: f64, i| w.max(self.violations[i]))
     }
 
-    /// The row that is furthest from being met, if any is not.
+    /// The row with the largest violation, if any is violated.
     fn most_violated(&self) -> Option<usize> {
         let worst =
             (0..self.rows.len()).max_by(|i, j| self.violations[*i].total_cmp(&self.violations[*j]))?;
@@ -226,7 +225,7 @@ fn active(qp: &Workspace) -> RowSet {
 }
 
 impl PeriodProblem<'_> {
-    /// The row from which the search starts: the pointwise one, or that of an instant to the order n.
+    /// The row from which the search starts: the pointwise one, or the one at an instant to the order n.
     fn first_row(&self, i: usize) -> Row {
         let requirement = &self.requirements[i];
         let slot = &self.slots[requirement.barrier];
@@ -236,9 +235,9 @@ impl PeriodProblem<'_> {
         }
     }
 
-    /// Finds u from the pointwise rows and `last`, the input of the step before. On return `rows` are
-    /// the sampled ones, linearised at `u`. `None`, with `rows` and `u` as a pointwise step would leave
-    /// them, where a source cannot predict or its prediction is not finite.
+    /// Finds u from the pointwise rows and `last`, the input of the previous step. On return `rows` are the sampled ones,
+    /// linearised at `u`. `None` if a source cannot predict or its prediction is not finite; `rows` and `u` are then as a
+    /// pointwise step would leave them.
     pub(crate) fn solve(
         &self,
         rows: &mut [Row],
@@ -281,14 +280,14 @@ impl PeriodProblem<'_> {
         let mut pointwise = [0.0; N];
         let pointwise = &mut pointwise[..m];
         let first = qp.solve(&self.problem(at.rows), pointwise);
-        // Nothing to do where u_ref meets the sampled rows.
+        // Nothing to do if u_ref meets the sampled rows.
         let doubtful = active(qp);
         let Some(unseen) = self.unmet_by_reference(u, doubtful, &mut at)? else {
             return Some(Solution { outcome: Outcome::Optimal, solver: Solver::Unchanged, iterations: 0 });
         };
         let watched = doubtful | at.violated();
         let against = at.most_violated();
-        // All but affine rows: a few corrections from u_ref.
+        // Almost affine rows: a few corrections from u_ref.
         if let Some(solution) = self.correct::<N>(u, last, [watched, unseen], against, &mut at, qp) {
             return Some(Solution { iterations: first.iterations + solution.iterations, ..solution });
         }
@@ -298,13 +297,13 @@ impl PeriodProblem<'_> {
         // Newton's method from both guesses.
         let Found { mut best, mut at_best, mut settled } =
             self.descend(u, [Some(&*pointwise), last], watched, &mut at, qp)?;
-        // Is the answer settled? An input far out turns the plant by an angle: there the rows have other answers, which
-        // steps that contract do not see.
+        // Is the answer settled? An input far from u_ref turns the plant by an angle: there the rows have other answers,
+        // which contracting steps do not see.
         let known = self.u_ref.iter().chain(last.into_iter().flatten());
         let size = known.fold(1.0, |s: f64, v| s.max(v.abs()));
         settled &= best.distance <= FAR * size;
         settled = settled && !against.is_some_and(|i| self.is_nearer_sideways(u, (i, false), &mut at));
-        // Look far around where the answer is in doubt.
+        // Search widely if the answer is in doubt.
         let widens =
             !self.is_backed && (self.widens || best.is_met(self.soft()) || first.outcome == Outcome::Optimal);
         if !settled
@@ -323,15 +322,15 @@ impl PeriodProblem<'_> {
             // The linearised rows can be met, the rows themselves could not.
             Outcome::Optimal if first.outcome == Outcome::Infeasible => Outcome::Infeasible,
             Outcome::Optimal => Outcome::IllConditioned,
-            // Rows relaxed on the way have been met after all.
+            // Rows that were relaxed in between have been met after all.
             Outcome::Infeasible | Outcome::IllConditioned if at.worst(self.soft()) <= 0.0 => Outcome::Optimal,
             other => other,
         };
         Some(Solution { outcome, solver: best.solver, iterations: first.iterations + best.iterations })
     }
 
-    /// Whether u_ref within its bounds, written to `u`, fails the sampled rows: if so, the rows that are not linearised
-    /// there. The `doubtful` ones are looked at first, and alone if one of them is violated.
+    /// Whether u_ref within its bounds, written to `u`, fails the sampled rows; if so, the rows that are not linearised
+    /// there. The `doubtful` ones are checked first, and alone if one of them is violated.
     fn unmet_by_reference(
         &self,
         u: &mut [f64],
@@ -352,8 +351,8 @@ impl PeriodProblem<'_> {
         Some((at.worst(RowSet::EMPTY) > 0.0).then_some(RowSet::EMPTY))
     }
 
-    /// The better of the answers that Newton's method finds from the `guesses`, written to `u`. The later guess is
-    /// left out where the one before met every row by steps that contracted.
+    /// The better of the answers that Newton's method finds from the `guesses`, written to `u`. The later guess is left out
+    /// if the one before met every row by steps that contracted.
     fn descend(
         &self,
         u: &mut [f64],
@@ -409,8 +408,8 @@ impl PeriodProblem<'_> {
         norm(u.iter().zip(&self.u_ref[..u.len()]).map(|(v, r)| v - r))
     }
 
-    /// Linearises the sampled rows of `again` at `u`, and evaluates the models of the others there.
-    /// `None` where there is no finite prediction.
+    /// Linearises the sampled rows of `again` at `u`, and evaluates the models of the others there. `None` if there is no
+    /// finite prediction.
     fn linearise(&self, u: &[f64], again: RowSet, at: &mut Linearised) -> Option<()> {
         // As in `solve`.
         match u {
@@ -446,7 +445,7 @@ impl PeriodProblem<'_> {
         Some(())
     }
 
-    /// A requirement under the input `u`, as a row on h⁽ⁿ⁾. `None` where there is no prediction.
+    /// A requirement under the input `u`, as a row on h⁽ⁿ⁾. `None` if there is no prediction.
     #[inline(always)]
     fn weighted(&self, requirement: &Requirement, u: &[f64], room: &mut Evaluations) -> Option<Weighted> {
         let slot = &self.slots[requirement.barrier];
@@ -498,12 +497,12 @@ impl PeriodProblem<'_> {
         // Near a floor of 0 the value is a small difference of what the input moves.
         let terms = terms + moved;
         let violation = if value < -MET * terms { -value / terms } else { 0.0 };
-        // What is not finite in the prediction is not finite here either: a weight of 0 times it is no number.
+        // If the prediction is not finite, neither is this: a weight of 0 times it is NaN.
         let finite = row.floor.is_finite() & all_finite(&row.normal[..u.len()]);
         finite.then_some(violation)
     }
 
-    /// The slack at `u` of the row of a requirement. `None` where there is no prediction.
+    /// The slack at `u` of the row of a requirement. `None` if there is no prediction.
     fn slack(&self, requirement: &Requirement, u: &[f64], room: &mut Evaluations) -> Option<f64> {
         if !self.errors.is_exact() {
             let mut row = Row::ZERO;
@@ -526,10 +525,10 @@ impl PeriodProblem<'_> {
         Some(())
     }
 
-    /// The size of the terms whose sum the row of a requirement is.
+    /// The size of the terms that add up to the row of a requirement.
     ///
-    /// A sum that cancels says nothing about its terms: 10 − p on the boundary. So every state and the time are changed
-    /// by a small part of themselves, and the terms no longer cancel. Each part is another one, of either sign, so that
+    /// A sum that cancels shows nothing of its terms: 10 − p on the boundary. So every state and the time are changed by a
+    /// small part of themselves, after which the terms no longer cancel. Each part is different, of either sign, so that
     /// sums of states do not cancel again.
     fn size(&self, requirement: &Requirement, u: &[f64]) -> f64 {
         const STATES: usize = 64;
@@ -554,16 +553,16 @@ impl PeriodProblem<'_> {
         if size.is_finite() { size } else { 0.0 }
     }
 
-    /// Whether row `i`, seen from half the way sideways, allows an answer that is nearer to u_ref than `u`. Where the rows
-    /// are all but affine, or miss little of a quadratic that is curved inwards, the others have to allow it too: else the
-    /// plant may turn so far that they do elsewhere.
+    /// Whether row `i`, seen from half the way sideways, allows an answer that is nearer to u_ref than `u`. If the rows are
+    /// almost affine, or differ little from a quadratic that is curved inwards, the others have to allow it too; otherwise
+    /// the plant may turn so far that they do elsewhere.
     #[inline(always)]
     fn is_nearer_sideways(&self, u: &[f64], (i, is_regular): (usize, bool), at: &mut Linearised) -> bool {
         self.look_sideways(u, (i, is_regular), at, |_, _| {})
     }
 
-    /// [`Self::is_nearer_sideways`]. Tells `seen` of each direction sideways, as far as it went without a nearer answer,
-    /// and the sum of the row's slacks there and on the opposite side.
+    /// [`Self::is_nearer_sideways`]. For each direction sideways, calls `seen` with how far it went without a nearer answer,
+    /// and with the sum of the row's slacks there and on the opposite side.
     #[inline(always)]
     fn look_sideways(
         &self,
@@ -594,7 +593,7 @@ impl PeriodProblem<'_> {
                 }
                 let sideways = &sideways[..m];
                 let nearer = (self.distance(sideways) - far) * normal;
-                // NaN where it is not known, as on a way that a bound cuts short.
+                // NaN if it is not known, as on a way that a bound cuts short.
                 let slack = self.slack(&self.requirements[i], sideways, at.evaluations);
                 if slack.is_some_and(|s| s > nearer)
                     && (!is_regular || self.others_leave_room(sideways, i, far, at))
@@ -612,7 +611,8 @@ impl PeriodProblem<'_> {
         false
     }
 
-    /// Whether every hard row but `i` holds from `sideways` on to where it is only `far` from u_ref, as where no other row is active.
+    /// Whether every hard row but `i` holds from `sideways` to the point that is only `far` from u_ref, as if no other row
+    /// were active.
     fn others_leave_room(&self, sideways: &[f64], i: usize, far: f64, at: &mut Linearised) -> bool {
         let (way, soft) = (self.distance(sideways) - far, self.soft());
         let has_row = |j: &usize| *j != i && !soft.contains(*j) && !self.requirements[*j].bound.is_zero();
@@ -622,8 +622,8 @@ impl PeriodProblem<'_> {
         })
     }
 
-    /// Newton's method from `u`, on the rows that the linearised QP does not give up. Rows of `watched`, and all that
-    /// become active or violated, are linearised on the way, all of them at the end.
+    /// Newton's method from `u`, on the rows that the linearised QP does not give up. Rows of `watched`, and all that become
+    /// active or violated, are linearised along the way, all of them at the end.
     fn newton(
         &self,
         u: &mut [f64],
@@ -657,7 +657,7 @@ impl PeriodProblem<'_> {
             found.violation = at.worst(found.relaxed);
             let size = u.iter().chain(&*target).fold(1.0, |s: f64, v| s.max(v.abs()));
             let way = u.iter().zip(&*target).fold(0.0, |d: f64, (a, b)| d.max((a - b).abs()));
-            // It ends where that answer moves nothing any more, and every row has been linearised.
+            // It ends when that answer no longer moves the input, and every row has been linearised.
             if found.violation <= 0.0 && way <= MET * size {
                 if watched != RowSet::ALL {
                     self.linearise(u, RowSet::ALL, at)?;
@@ -689,8 +689,8 @@ impl PeriodProblem<'_> {
         Some(found)
     }
 
-    /// Moves `u` towards `target` by a part of the way that lets the violation decrease sufficiently. Leaves it where it is,
-    /// and returns false, where there is none.
+    /// Moves `u` towards `target` by a part of the way that lets the violation decrease sufficiently. If there is none,
+    /// leaves it unchanged and returns false.
     fn line_search(
         &self,
         u: &mut [f64],
@@ -728,11 +728,11 @@ struct Found {
     best: Candidate,
     /// Whether the rows are linearised at `best`.
     at_best: bool,
-    /// Whether it is surely right: reached by steps that contracted, or the same from both guesses.
+    /// Whether it is certainly right: reached by steps that contracted, or the same from both guesses.
     settled: bool,
 }
 
-/// An input that the search arrived at.
+/// An input at which the search arrived.
 struct Candidate {
     /// The rows that `violation` does not count.
     relaxed: RowSet,
@@ -741,9 +741,9 @@ struct Candidate {
     outcome: Outcome,
     solver: Solver,
     iterations: u32,
-    /// Whether the QP linearised at it does not move it any more.
+    /// Whether the QP linearised at it no longer moves it.
     ended: bool,
-    /// Whether it met every row by steps that contracted: there is no other answer near.
+    /// Whether it met every row by steps that contracted: there is no other answer nearby.
     sure: bool,
 }
 

@@ -1,17 +1,17 @@
-//! The change of the input that a filter returns with the state and the input wanted.
+//! The derivative of the returned input with respect to the state and the reference input.
 //!
-//! The returned u solves `min ½‖u − u_ref‖²` under G_i(x, u) ≥ 0 and the bounds. The row G_i is affine in u for
-//! the pointwise constraint, not where it is enforced over the period. With the active ones A, their
-//! multipliers ϑ and a prime for the derivative along the direction (x', u_ref'),
+//! The returned u solves `min ½‖u − u_ref‖²` under G_i(x, u) ≥ 0 and the bounds. The row G_i is affine in u for the
+//! pointwise constraint, but not if it is enforced over the period. With the active rows A, their multipliers ϑ and a prime
+//! for the derivative along the direction (x', u_ref'),
 //!
 //! ```text
 //! u' − Σ_{i∈A} (ϑ_i' ∇_u G_i + ϑ_i (∇²_uu G_i u' + ∇²_ux G_i x')) = u_ref',
 //! ∇_u G_iᵀ u' + ∇_x G_iᵀ x' = 0   for i in A,                                             (8)
 //! ```
 //!
-//! by the implicit function theorem (`docs/theory.md#input-sensitivity`). A bound that holds u_j has u_j' = 0. A soft
-//! row at its largest multiplier pulls with κ∇G/‖∇G‖ whatever its value. All derivatives of G are exact: jets with
-//! one more direction ([`Directional`](crate::lie::Directional)) and the derivative of the promise
+//! by the implicit function theorem (`docs/theory.md#input-sensitivity`). A bound that holds u_j has u_j' = 0. A soft row at
+//! its largest multiplier pulls with κ∇G/‖∇G‖ whatever its value. All derivatives of G are exact: jets with one more
+//! direction ([`Directional`](crate::lie::Directional)) and the derivative of the promise
 //! ([`FixedTime::differentiate`](crate::convergence::FixedTime::differentiate)), anchors included.
 //!
 //! # References
@@ -34,7 +34,7 @@ use crate::qp::sensitivity::Equations;
 use crate::qp::{self, Constraint, Enforcement, Problem, Solver};
 use crate::{MAX_INPUTS, MAX_ROWS};
 
-/// The derivative of a sample along one direction, and the memory to compute it in, to be used again and again.
+/// The derivative of a sample along one direction, and reusable memory for computing it.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SampleDerivative {
@@ -46,10 +46,10 @@ pub struct SampleDerivative {
     /// State, direction and zeros.
     #[cfg_attr(feature = "serde", serde(skip))]
     scratch: [Vec<f64>; 3],
-    /// Answers to the sample moved back and on.
+    /// Answers to the perturbed sample, on either side.
     #[cfg_attr(feature = "serde", serde(skip))]
     moved: [Vec<f64>; 2],
-    /// A direction of state and reference, and what the derivatives along some add up to.
+    /// A direction of state and reference, and the sum of the derivatives along some of the axes.
     #[cfg_attr(feature = "serde", serde(skip))]
     axis: Vec<f64>,
     #[cfg_attr(feature = "serde", serde(skip))]
@@ -88,7 +88,7 @@ pub struct BarrierDerivative {
     pub sampling_loss: f64,
 }
 
-/// The reason why a derivative is not known. The number is that of the barrier.
+/// Why a derivative is not known. The number is that of the barrier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum NoDerivative {
@@ -137,15 +137,15 @@ impl RowDerivative {
     };
 }
 
-/// Largest distance, as a part of its size, of the input from the answer to the rows linearised at it. It is round-off,
-/// but where Newton's method ran into its limit of iterations, some of 100 samples. The derivative is then in error by
-/// a number of that order.
+/// Largest distance, as a part of its size, of the input from the answer to the rows linearised at it. Usually it is
+/// round-off. Where Newton's method reached its limit of iterations, in a few of 100 samples, it is more, and the derivative
+/// then has an error of that order.
 const SAME_INPUT: f64 = 1e-3;
 
-/// The same where the rows are not met: beyond it the search got stuck.
+/// The same if the rows are not met or a plan backs the step: beyond it the search got stuck.
 const SAME_INPUT_UNMET: f64 = 1e-6;
 
-/// A multiplier from this part of its largest on counts as the largest.
+/// A multiplier counts as the largest from this part of the largest on.
 const SATURATED: f64 = 1.0 - 1e-9;
 
 impl Rows {
@@ -176,7 +176,7 @@ impl Rows {
         out.u = [0.0; MAX_INPUTS];
         out.barriers.clear();
         out.barriers.resize(self.slots.len(), BarrierDerivative::default());
-        // Whether they are needed or not, so that no later sample allocates.
+        // Allocated whether needed or not, so that no later sample allocates.
         let numbers = MAX_INPUTS + 5 * self.slots.len();
         let lengths = [numbers, numbers, numbers, self.state_dim + self.input_dim, self.state_dim];
         let [less, more] = &mut out.moved;
@@ -200,8 +200,8 @@ impl Rows {
         }
     }
 
-    /// The derivative as the sum of those along each axis, with quotients of differences where the answer is smooth: linear in the
-    /// direction all the same.
+    /// The derivative as the sum of those along each axis, with difference quotients where the answer is smooth. It remains
+    /// linear in the direction.
     fn by_axes(
         &mut self,
         t: f64,
@@ -235,9 +235,9 @@ impl Rows {
         Ok(unknown)
     }
 
-    /// Puts quotients of differences in the place of the derivatives of the input and of all but h in the reports, where the answer `u` to
-    /// the sample is smooth along an axis. For answers that are not the nearest input, and with errors of the measurement, whose part in a
-    /// row contains derivatives by the state already.
+    /// Replaces the derivatives of the input, and of all but h in the reports, by difference quotients, if the answer `u` to
+    /// the sample is smooth along an axis. Used for answers that are not the nearest input, and with measurement errors,
+    /// whose part in a row already contains derivatives with respect to the state.
     fn quotient(
         &mut self,
         t: f64,
@@ -247,9 +247,9 @@ impl Rows {
         direction: Direction,
         out: &mut SampleDerivative,
     ) -> Result<(), Error> {
-        /// Of a state or an input, and of 1 of its unit where it is less.
+        /// Step of the quotient, as a part of a state or an input, or of 1 of its unit if it is smaller.
         const PART: f64 = 1e-5;
-        /// The part by which the quotients to both sides may differ.
+        /// Largest difference between the quotients on both sides, as a part.
         const KINK: f64 = 0.02;
         let along = direction.x.iter().chain(direction.u);
         let by = x.iter().chain(u_ref).zip(along).find(|(_, d)| **d != 0.0);
@@ -290,8 +290,8 @@ impl Rows {
         Ok(())
     }
 
-    /// Makes the derivative `out` of the answer of the rows, just computed, that of the input `u` in its place, which moves
-    /// by `du`: of the numbers of the report it is the slack that follows.
+    /// Turns the derivative `out` of the rows' answer, just computed, into that of the input `u` that replaces it and moves
+    /// by `du`. Of the numbers of the report only the slack changes.
     #[cfg(feature = "plan")]
     pub(crate) fn carry(
         &self,
@@ -320,7 +320,7 @@ impl Rows {
         Ok(())
     }
 
-    /// The derivative where the filter is not armed yet: u_ref passes, and h is reported.
+    /// The derivative while the filter is not armed: u_ref passes, and h is reported.
     fn directional_unarmed(
         &self,
         t: f64,
@@ -342,7 +342,7 @@ impl Rows {
         Ok(())
     }
 
-    /// Returns whether the input is the one that is nearest to u_ref on the rows linearised there, which do not stand at instants
+    /// Returns whether the input is the one nearest to u_ref on the rows linearised there, with no active row at an instant
     /// that a search found.
     fn directional(
         &self,
@@ -386,13 +386,13 @@ impl Rows {
         let is_rough = self.is_backed || !report.status.is_satisfied();
         let same = if is_rough { SAME_INPUT_UNMET } else { SAME_INPUT };
         let is_nearest = u.iter().zip(&*again).all(|(a, b)| (a - b).abs() <= same * size);
-        // An instant at which a row is held moves with the sample, which no row tells.
+        // The instant at which a row is enforced moves with the sample, and no row shows this.
         let is_instant = |k: usize| k >= self.slots.len() && workspace.requirements[k].is_instant();
         let stands = qp.active().iter().all(|a| !matches!(a.constraint, Constraint::Row(k) if is_instant(k)));
-        // The derivative of u: (8) with the active rows, else the direction of u_ref but at bounds.
+        // The derivative of u: (8) with the active rows; otherwise the direction of u_ref, except at bounds.
         let active = qp.active();
         if active.iter().any(|a| matches!(a.constraint, Constraint::Row(_))) {
-            // Where rows are curved so much that (8) has no solution, as if they did not.
+            // If the rows are so curved that (8) has no solution, their curvature is ignored.
             for bends in [true, false] {
                 let mut equations = Equations::new(direction.u);
                 for active in active {
@@ -432,7 +432,7 @@ impl Rows {
             }
         }
 
-        // The numbers of the report that follow u: slack and sampling loss.
+        // The numbers of the report that depend on u: slack and sampling loss.
         for (i, (b, row_derivative)) in barriers.iter_mut().zip(&row_derivatives).enumerate() {
             b.slack = row_derivative.slack + dot(&rows[i].normal, du);
             let loss = report.barriers[i].sampling_loss;
@@ -446,7 +446,7 @@ impl Rows {
         Ok(is_nearest && stands)
     }
 
-    /// Writes the state from which barrier `i` is held, and its direction, to `scratch`.
+    /// Writes the state from which barrier `i` is enforced, and its direction, to `scratch`.
     fn begin(
         &self,
         i: usize,
@@ -519,8 +519,8 @@ impl Rows {
         Ok((row_derivative, derivative))
     }
 
-    /// The derivative of the bounds of barrier `i`, from its derivatives where the input begins to act and their `change` at the
-    /// fixed input `u`.
+    /// The derivative of the bounds of barrier `i` at the fixed input `u`, from its derivatives where the input begins to
+    /// act and from their `change`.
     fn bound_change(
         &self,
         i: usize,
@@ -532,7 +532,7 @@ impl Rows {
         let (before, promise) = (&self.state.barriers[i], &self.workspace.next.barriers[i]);
         let anchors = is_anchored(before, promise, begin);
         let n = slot.degree();
-        // What the input can do, and how that moves.
+        // What the input can do, and how that changes.
         let gain = if anchors { 0.0 } else { before.gain };
         let turn = &change.gradient[n];
         let square = dot(&now.row, &now.row);
@@ -566,8 +566,8 @@ impl Rows {
         )
     }
 
-    /// The derivative at the fixed input `u` of a row after those of the barriers: that of the longest step, or of an instant
-    /// between two samples, which is held.
+    /// The derivative, at the fixed input `u`, of a row that follows those of the barriers: that of the longest step, or of
+    /// an instant between two samples, which is held constant.
     fn further(
         &self,
         requirement: &Requirement,
@@ -599,7 +599,7 @@ impl Rows {
         Ok(RowDerivative { slack: row.value, normal: row.normal, ..RowDerivative::NONE })
     }
 
-    /// The derivative of the row of a requirement at the fixed input `u`, where its bound moves by `moved`.
+    /// The derivative of the row of a requirement at the fixed input `u`, as its bound moves by `moved`.
     fn ahead_derivative(
         &self,
         requirement: &Requirement,
@@ -626,7 +626,7 @@ impl Rows {
         })
     }
 
-    /// The derivative of row `k`'s normal by u: `[i][j]` is that of its component i by u_j.
+    /// The derivative of row `k`'s normal with respect to u: `[i][j]` is that of its component i with respect to u_j.
     fn curvature(
         &self,
         k: usize,
@@ -677,8 +677,7 @@ fn is_saturated(normal: &[f64; MAX_INPUTS], multiplier: f64, penalty: f64) -> bo
     multiplier * elementary::sqrt(dot(normal, normal)) >= SATURATED * penalty
 }
 
-/// Adds the pull κa/‖a‖ of a soft row at its largest multiplier, with the change (1 − nnᵀ) a' κ/‖a‖ where
-/// n = a/‖a‖.
+/// Adds the pull κa/‖a‖ of a soft row at its largest multiplier, with the change (1 − nnᵀ) a' κ/‖a‖, where n = a/‖a‖.
 fn pull_saturated(
     equations: &mut Equations,
     row: &[f64; MAX_INPUTS],

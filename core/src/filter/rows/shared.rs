@@ -1,4 +1,5 @@
-//! What barriers along one plant share: the motion of the states at a sample, and where the last input that was tried leads.
+//! Work shared by barriers along one plant: the motion of the states at a sample, and the prediction for the last input
+//! tried.
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -10,13 +11,13 @@ use crate::lie::{Ahead, DerivativeSource, Derivatives, SharedPlant};
 
 /// The evaluations of one plant at the present sample.
 struct Plant {
-    /// The motion from the state from which the input acts.
+    /// The motion from the state at which the input begins to act.
     motion: Box<dyn Any + Send>,
     is_moving: bool,
-    /// Where the input held for the duration (s) leads.
+    /// The prediction for the input held for the duration (s).
     ahead: Box<dyn Any + Send>,
     input: [f64; MAX_INPUTS],
-    /// `None` before the first one.
+    /// `None` before the first prediction.
     duration: Option<f64>,
 }
 
@@ -44,7 +45,7 @@ type Source<'a> = (&'a dyn DerivativeSource, Option<usize>);
 pub(crate) struct SharedPlants(Vec<Plant>);
 
 impl SharedPlants {
-    /// Finds the plants that the sources of `slots` share, and tells each its number.
+    /// Finds the plants that the sources of `slots` share, and gives each source the number of its plant.
     pub(crate) fn of(slots: &mut [BarrierSlot]) -> Self {
         let mut plants = Vec::new();
         for i in 0..slots.len() {
@@ -68,7 +69,7 @@ impl SharedPlants {
         Self(plants)
     }
 
-    /// Begins another sample.
+    /// Starts another sample.
     #[inline(always)]
     pub(crate) fn forget(&mut self) {
         for plant in &mut self.0 {
@@ -76,7 +77,8 @@ impl SharedPlants {
         }
     }
 
-    /// Writes the derivatives of the barrier of a source at time `t` (s) and the state `x` from which the input of the sample acts.
+    /// Writes the derivatives of the barrier of a source at time `t` (s) and the state `x`, at which the input of the sample
+    /// begins to act.
     #[inline(always)]
     pub(crate) fn evaluate(&mut self, source: Source, t: f64, x: &[f64], out: &mut Derivatives) {
         let Some((plant, source)) = self.shared(source) else { return source.0.evaluate(t, x, out) };
@@ -87,8 +89,8 @@ impl SharedPlants {
         source.evaluate_along(t, &*plant.motion, out);
     }
 
-    /// Writes what [`Predict::ahead_of_row`](crate::lie::Predict::ahead_of_row) does for the barrier of `slot`. `None` where there
-    /// is no prediction.
+    /// Writes what [`Predict::ahead_of_row`](crate::lie::Predict::ahead_of_row) does for the barrier of `slot`. `None` if
+    /// there is no prediction.
     #[inline(always)]
     pub(crate) fn ahead_of_row(
         &mut self,

@@ -1,4 +1,5 @@
-//! One barrier of a filter: its derivatives, its promise, when that is in force, and the result of a sample for it.
+//! One barrier of a filter: its derivatives, its promise, when the promise is in force, and the barrier's result of a
+//! sample.
 
 use alloc::borrow::ToOwned;
 use alloc::boxed::Box;
@@ -20,8 +21,8 @@ use crate::lie::{DerivativeSource, Derivatives};
 use crate::qp::{Bounds, Enforcement, Row};
 use crate::{MAX_RELATIVE_DEGREE, reach};
 
-/// The time from which a barrier is enforced. Its deadline counts from the filter's first sample in any case: "be
-/// in A by 5 s, then in B by 10 s" has the deadlines 5 s and 10 s.
+/// The time from which a barrier is enforced. Its deadline always counts from the filter's first sample: "be in A by 5 s,
+/// then in B by 10 s" has the deadlines 5 s and 10 s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
@@ -29,7 +30,7 @@ pub enum Begin {
     /// From the first sample.
     #[default]
     AtOnce,
-    /// From this many seconds after it, finite, ≥ 0, less than the deadline.
+    /// From this many seconds after the first sample, finite, ≥ 0, less than the deadline.
     At(f64),
     /// From the arrival of the barrier of this number, counted from 0 and added before.
     AfterArrival(usize),
@@ -49,20 +50,20 @@ pub enum End {
     OnArrival,
 }
 
-/// How a barrier's constraint is treated where not all can be met within the input bounds.
+/// How a barrier's constraint is treated if not all can be met within the input bounds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Strictness {
-    /// Hard, with priority 0 where h ≥ 0 held at the anchor and 1 where not: keeping safe sets goes before reaching
-    /// promised ones.
+    /// Hard, with priority 0 if h ≥ 0 held at the anchor and 1 if not: keeping safe sets comes before reaching promised
+    /// ones.
     #[default]
     KeepFirst,
-    /// Hard: met as far as the bounds and the barriers of smaller numbers allow; of equal ones the one added
-    /// first goes first.
+    /// Hard: met as far as the bounds and the barriers of smaller numbers allow. Among equal numbers the one added first
+    /// comes first.
     Priority(u32),
-    /// Soft, with an exact penalty: it yields, to u_ref too, where it would cost more than this distance
-    /// ‖u − u_ref‖, in units of u, finite, > 0.
+    /// Soft, with an exact penalty: it yields, even to u_ref, if it would cost more than this distance ‖u − u_ref‖, in units
+    /// of u, finite, > 0.
     Soft(f64),
 }
 
@@ -70,7 +71,7 @@ pub enum Strictness {
 pub(crate) struct BarrierSlot {
     pub(crate) name: String,
     pub(crate) source: Box<dyn DerivativeSource>,
-    /// The number of its plant, where others share it.
+    /// The number of its plant, if other barriers share it.
     pub(crate) plant: Option<usize>,
     pub(crate) promise: FixedTime,
     pub(crate) begin: Begin,
@@ -82,9 +83,9 @@ pub(crate) struct BarrierSlot {
     pub(crate) now: SlotSample,
 }
 
-/// Result of a sample for one barrier: scratch memory that every sample rewrites.
+/// A barrier's result of a sample: scratch memory that every sample rewrites.
 pub(crate) struct SlotSample {
-    /// Whether the barrier is in force; the other fields mean something only where it is.
+    /// Whether the barrier is in force; the other fields are meaningful only then.
     pub(crate) in_force: bool,
     /// The state from which the input acts.
     pub(crate) from: Vec<f64>,
@@ -92,7 +93,7 @@ pub(crate) struct SlotSample {
     pub(crate) derivatives: Derivatives,
     /// Derivatives of h⁽⁰⁾ … h⁽ⁿ⁻¹⁾ along each measurement error.
     pub(crate) slopes: Vec<ErrorSlopes>,
-    /// What h may fall short of its prediction by, if anything is off.
+    /// How far h may fall short of its prediction, if it may.
     pub(crate) shortfall: Option<Shortfall>,
     /// The least h⁽ⁿ⁾ that keeps the promise.
     pub(crate) bound: DerivativeBound,
@@ -121,7 +122,7 @@ impl SlotSample {
         }
     }
 
-    /// Takes the barrier out of force: it asks for nothing.
+    /// Takes the barrier out of force, so that it requires nothing.
     fn idle(&mut self) {
         self.in_force = false;
         (self.row, self.period_bound, self.lowest) = (Row::ZERO, PeriodBound::ZERO, None);
@@ -142,8 +143,8 @@ impl BarrierSlot {
         self.promise.relative_degree()
     }
 
-    /// Evaluates h and its derivatives along the plant where the input begins to act
-    /// (docs/theory.md, sections 1 and 8). Returns h at the sample itself.
+    /// Evaluates h and its derivatives along the plant where the input begins to act (docs/theory.md, sections 1 and 8).
+    /// Returns h at the sample itself.
     #[inline]
     pub(crate) fn evaluate(&mut self, moment: &Moment, acting: &[f64], plants: &mut SharedPlants) -> f64 {
         let Self { source, plant, now, .. } = self;
@@ -160,13 +161,13 @@ impl BarrierSlot {
         h.unwrap_or(now.derivatives.drift[0])
     }
 
-    /// Moves the promise number `index` of `promises` to the sample, where h is `h`: whether it is in force, its
-    /// anchor, its phase, and the least h⁽ⁿ⁾ that keeps it (docs/theory.md, sections 6 and 8). Returns whether the
-    /// deadline is unreachable.
+    /// Moves the promise number `index` of `promises` to the sample, at which h is `h`: whether it is in force, its anchor,
+    /// its phase, and the least h⁽ⁿ⁾ that keeps it (docs/theory.md, sections 6 and 8). Returns whether the deadline is
+    /// unreachable.
     ///
     /// # Errors
     ///
-    /// Derivatives that carry no constraint.
+    /// Derivatives that cannot carry a constraint.
     #[inline]
     pub(crate) fn advance(
         &mut self,
@@ -210,8 +211,8 @@ impl BarrierSlot {
         Ok(is_unreachable)
     }
 
-    /// Forms the row of that floor, L_fⁿh + L_gL_fⁿ⁻¹h u ≥ floor (docs/theory.md, section 1), and (S) of the period
-    /// (`docs/theory.md#sampled-form`). Returns whether there is one of the period.
+    /// Forms the row of that floor, L_fⁿh + L_gL_fⁿ⁻¹h u ≥ floor (docs/theory.md, section 1), and (S) over the period
+    /// (`docs/theory.md#sampled-form`). Returns whether there is one over the period.
     #[inline]
     pub(crate) fn form_row(&mut self, promise: &FixedTimeState, moment: &Moment) -> bool {
         let n = self.degree();
@@ -226,7 +227,7 @@ impl BarrierSlot {
         bound.is_some()
     }
 
-    /// (S) over another `duration` in s, `None` where the barrier is not in force or has none.
+    /// (S) over another `duration` in s; `None` if the barrier is not in force or has none.
     pub(crate) fn over(
         &self,
         promise: &FixedTimeState,
@@ -253,7 +254,7 @@ impl BarrierSlot {
         errors.of_derivatives(&*self.source, moment.t, moment.x, moment.u_ref.len(), &mut self.now.slopes)
     }
 
-    /// The influence of plant and inputs on h⁽ⁿ⁾. Notes the largest ‖L_gL_fⁿ⁻¹h‖ so far in `promise`.
+    /// The influence of plant and inputs on h⁽ⁿ⁾. Records the largest ‖L_gL_fⁿ⁻¹h‖ so far in `promise`.
     #[inline]
     fn means(&self, promise: &mut FixedTimeState, moment: &Moment, bounds: &Bounds) -> Means {
         let Derivatives { drift, row, .. } = &self.now.derivatives;
@@ -280,8 +281,8 @@ impl BarrierSlot {
         }
     }
 
-    /// Whether the barrier at `index` of `barriers` is in force at time `t` with the value `h`; releases it
-    /// where it has ceased to be.
+    /// Whether the barrier at `index` of `barriers` is in force at time `t` with the value `h`. Releases it if it no longer
+    /// is.
     #[inline]
     pub(crate) fn in_force(&self, barriers: &mut [FixedTimeState], index: usize, t: f64, h: f64) -> bool {
         let begun = !matches!(barriers[index].phase, Phase::Waiting | Phase::Released);
@@ -313,8 +314,8 @@ impl BarrierSlot {
         begun && !ended
     }
 
-    /// Anchors `promise` where it waits for that, from the least derivatives `h`. Where samples turn out to be
-    /// further apart than was thought at the anchor, adapts the margin.
+    /// Anchors `promise` if it waits for that, from the least derivatives `h`. Adapts the margin if samples turn out to be
+    /// farther apart than assumed at the anchor.
     #[inline]
     fn anchor(&self, promise: &mut FixedTimeState, moment: &Moment, h: &[f64]) {
         let covered = moment.covered();
@@ -331,13 +332,13 @@ impl BarrierSlot {
         }
     }
 
-    /// Whether model and measurement are exact. Otherwise nothing is ruled out: a disturbance may help.
+    /// Whether model and measurement are exact. If not, nothing is ruled out: a disturbance may help.
     pub(crate) fn is_undisturbed(&self) -> bool {
         self.exact && self.promise.settings().disturbance == 0.0
     }
 
     /// Whether the deadline, in `time_left` s, certainly cannot be met: no input within `bounds` has h ≥ 0 then
-    /// (`docs/theory.md#lost-deadline`), or it has passed outside.
+    /// (`docs/theory.md#lost-deadline`), or it has passed with the state outside.
     fn is_unreachable(
         &self,
         promise: &FixedTimeState,
@@ -355,13 +356,14 @@ impl BarrierSlot {
         }
     }
 
-    /// Gives up a deadline that is lost, where the settings say so: restarts the promise with a later one
-    /// ([`Infeasible::Earliest`]). Returns whether it did.
+    /// Gives up a lost deadline, if the settings say so: restarts the promise with a later one ([`Infeasible::Earliest`]).
+    /// Returns whether it did.
     fn postpone(&self, promise: &mut FixedTimeState, moment: &Moment, bounds: &Bounds, h: &[f64]) -> bool {
-        /// New deadline over the earliest time not ruled out: stopping in the set takes longer than getting there.
+        /// New deadline, in units of the earliest time not ruled out: stopping in the set takes longer than getting there.
         const FACTOR: f64 = 2.0;
+        /// Growth of that factor from each postponement to the next.
         const GROWTH: f64 = 1.5;
-        /// The longest deadline looked for, in units of the configured one.
+        /// The longest deadline tried, in units of the configured one.
         const HORIZON: f64 = 1e3;
         if self.promise.settings().infeasible != Infeasible::Earliest {
             return false;
@@ -370,7 +372,7 @@ impl BarrierSlot {
         let now = (moment.begin, &*self.now.from);
         let earliest = reach::earliest_arrival(&*self.source, now, bounds, HORIZON * configured);
         let factor = FACTOR * elementary::powi(GROWTH, promise.postponed.min(16) as i32);
-        // Near the set the earliest time tends to zero: never shorter than ten samples.
+        // Near the set the earliest time tends to zero, so the deadline is never shorter than ten samples.
         let deadline = match earliest {
             Some(earliest) if earliest > 0.0 => (factor * earliest).max(10.0 * moment.period.unwrap_or(0.0)),
             _ => configured,
@@ -383,12 +385,12 @@ impl BarrierSlot {
     }
 }
 
-/// The reason why derivatives cannot carry a constraint, if they cannot.
+/// Why the derivatives cannot carry a constraint, if they cannot.
 #[inline]
 fn defect(derivatives: &Derivatives, n: usize, inputs: usize) -> Option<Status> {
     /// An input that enters below the declared degree by more than this part of the row is real.
     const OF_ROW: f64 = 1e-9;
-    /// So is one by more than this part of the derivatives themselves; round-off of cancelling terms stays below.
+    /// The same for this part of the derivatives themselves; round-off of cancelling terms stays below.
     const OF_DERIVATIVES: f64 = 1e-13;
     // A finite sum has finite terms.
     let sum = derivatives.drift[..=n].iter().chain(&derivatives.row[..inputs]).fold(0.0, |sum, v| sum + v);

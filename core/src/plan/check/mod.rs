@@ -1,22 +1,23 @@
-//! The exact check: the plant run ahead under a law, with every requirement looked at, between the nodes too.
+//! The exact check: the plant run ahead under a law, with every requirement checked, between the nodes too.
 //!
-//! Under one input, state and h are followed by their Taylor [expansions](crate::lie::Expansion) in pieces. A piece ends
-//! where the last terms of a state no longer vanish, and is halved until the expansion of every state is a solution on all
-//! of it: by [enclosures](crate::interval) of the plant's rate there. Where a source has none, in its middle and at its
-//! end, and it is assumed that what curves the plant's motion shows there.
+//! Under one input, state and h are followed in pieces by their Taylor [expansions](crate::lie::Expansion). A piece ends
+//! where the last terms of a state no longer vanish. It is then halved until the expansion of every state is a solution on
+//! all of it, which [enclosures](crate::interval) of the plant's rate there show. If a source has no enclosures, the rate is
+//! compared in the middle and at the end of the piece, on the assumption that the curvature of the plant's motion shows
+//! there.
 //!
-//! On a piece h has a lower bound: the least Bernstein coefficient of its expansion, which none of its values falls below,
-//! less its last terms and less four times what the expansion misses h by at four instants. What curves h between them
-//! shows in enclosures: of h on the piece, or of the last coefficient of an expansion that begins anywhere on it, which by
-//! Taylor's theorem is all that the others leave open. Where these do not decide, the piece is halved for this h. Where a
-//! source has no enclosures, it is assumed that h bends as those instants show.
+//! On a piece h has a lower bound: the least Bernstein coefficient of its expansion, which is below all of its values, less
+//! its last terms, and less four times the error of the expansion at four instants. Enclosures show the curvature of h
+//! between these instants: they enclose h on the piece, or the last coefficient of an expansion that begins anywhere on it,
+//! which by Taylor's theorem is all that the others leave open. If these do not decide, the piece is halved for this h. If a
+//! source has no enclosures, it is assumed that h is curved as those instants show.
 //!
 //! | module | owns |
 //! |---|---|
-//! | here | the roll-out: holds, pieces, and what h does not fall below on each |
-//! | `perturbed` | a plant beside that of the roll-out: whether a deviation too small to measure grows |
+//! | here | the rollout: holds, pieces, and a lower bound on h for each |
+//! | `perturbed` | a plant near that of the rollout: whether a deviation too small to measure grows |
 //! | `terminal` | the end: whether the plant stays at an equilibrium for ever, or how a plan ends without one |
-//! | `motion` | how what has nearly died away goes on to move |
+//! | `motion` | the extrapolation of motions that have nearly died away |
 
 mod motion;
 mod perturbed;
@@ -36,67 +37,68 @@ use crate::lie::{EXPANSION_ORDERS, Expansion, ExpansionOver, FEW_ORDERS, RateOve
 use crate::scalar::all_finite;
 use perturbed::{Perturbed, SPREADS};
 
-/// Most pieces of a roll-out.
+/// Largest number of pieces of a rollout.
 const MOST_PIECES: u32 = 100_000;
-/// The last terms of a state's expansion at the end of a piece, as a part of its size.
+/// Largest last terms of a state's expansion at the end of a piece, as a part of its size.
 const TRUNCATED: f64 = 1e-10;
-/// By how much the expansion of a state may miss being a solution over the piece, as a part of its change there and beside
-/// 1.
+/// Largest residual of a state's expansion over a piece, as a part of 1 plus its change there.
 const RESIDUAL: f64 = 1e-8;
-/// Coefficients of the rate of the states that bound this: first few, then all.
+/// Numbers of coefficients of the rates used to bound this residual: a few first, then all.
 const ORDERS: [usize; 2] = [FEW_ORDERS, EXPANSION_ORDERS - 1];
-/// How much longer than a piece that has been halved the next may be. The one after that by the square of it, and so on.
+/// Growth from a halved piece to the longest next one. For the piece after that it is squared, and so on.
 const LONGER: f64 = 1.2;
-/// The margin at the edge of a set, in units of that inside: what round-off may miss.
+/// The margin at the edge of a set, in units of that inside: a shortfall by round-off is allowed.
 const EDGE: f64 = -1e-6;
-/// Halvings of a piece whose bound does not decide, and of those the ones that may only make it sharper.
+/// Halvings of a piece whose bound does not decide.
 const HALVINGS: u32 = 14;
+/// The number of these that may only sharpen the bound.
 const SHARPER: u32 = 3;
-/// The bound of a piece that is sharp enough, as a part of the least value seen.
+/// Least bound of a piece that is sharp enough, as a part of the least value seen.
 const SHARP: f64 = 0.8;
-/// Instants of a piece at which its expansion is compared with h, and what a difference there counts for between them.
+/// Number of instants of a piece at which its expansion is compared with h.
 const INSTANTS: u32 = 4;
+/// Factor on the largest error at these instants, for the times between them.
 const MISSED: f64 = 4.0;
 /// Change of a state over a hold that is round-off, as a part of its size.
 pub(super) const ROUND_OFF: f64 = 16.0 * f64::EPSILON;
-/// Difference of a sample from its time that counts as none, as a part of the period. Round-off of times is another.
+/// Difference of a sample from its time that counts as none, as a part of the period. Round-off of times is separate.
 pub(crate) const ON_TIME: f64 = 1e-6;
 
-/// The samples of a roll-out.
+/// The samples of a rollout.
 #[derive(Clone, Copy)]
 pub(super) struct Grid {
     /// The time in s for which the input of the first one is held.
     pub(super) period: f64,
-    /// Whether the others follow in the same period, so that inputs change then; else they come as the plan has them.
+    /// Whether the others follow with the same period, so that inputs change then; otherwise they come as in the plan.
     pub(super) even: bool,
 }
 
 impl Grid {
-    /// By how much an end lies past a sample at least, in s: what it is meant to be is not that sample.
+    /// Least time in s by which an end has to lie past a sample: an end that is meant to be the sample does not count.
     pub(super) fn slack(&self) -> f64 {
         self.period * if self.even { 0.5 } else { ON_TIME }
     }
 }
 
-/// A roll-out in progress.
+/// A rollout in progress.
 pub(super) struct Walk<'a> {
     model: Model<'a>,
     requirements: &'a [Requirement<'a>],
-    /// What every margin is multiplied by.
+    /// Factor on every margin.
     strictness: f64,
     t: f64,
     x: Vec<f64>,
-    /// The expansions of the states from here on, a state on them and its rate.
+    /// The expansions of the states from here on, a state along them and its rate.
     path: Vec<Expansion>,
     point: Vec<f64>,
     rate: Vec<f64>,
     /// Enclosures of those expansions and of the rate on a piece.
     over: Vec<ExpansionOver>,
     rate_over: Vec<RateOver>,
-    /// The expansions beside those of the states.
+    /// The expansions from a perturbed state.
     beside: Vec<Expansion>,
     pieces: u32,
-    /// The most of them.
+    /// The largest number of pieces.
     pub(super) most_pieces: u32,
     /// The longest piece in s to try, and how much longer the next one may be.
     longest: f64,
@@ -108,8 +110,8 @@ pub(super) struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
-    /// Begins at `t` and `x`, where every requirement in force has to be met with `strictness` times its margin. Samples
-    /// are those of `grid`.
+    /// Begins at `t` and `x`, where every requirement in force has to be met with `strictness` times its margin. Samples are
+    /// those of `grid`.
     pub(super) fn new(
         model: Model<'a>,
         requirements: &'a [Requirement<'a>],
@@ -150,7 +152,7 @@ impl<'a> Walk<'a> {
         Ok(walk)
     }
 
-    /// Takes over the rates of the plan before.
+    /// Takes over the rates of the previous plan.
     pub(super) fn after(mut self, before: &BackupPlan) -> Self {
         for (rate, before) in self.backup_plan.rates.iter_mut().zip(&before.rates) {
             *rate = rate.max(*before);
@@ -174,7 +176,7 @@ impl<'a> Walk<'a> {
         self.t >= self.requirements[i].firm
     }
 
-    /// Notes that h of requirement `i` is at least `h` around `t`.
+    /// Records that h of requirement `i` is at least `h` around `t`.
     fn note(&mut self, i: usize, t: f64, h: f64) -> Result<(), Failure> {
         let (barrier, missing) = (self.requirements[i].barrier, h - self.least_of(i));
         // NaN counts as broken too.
@@ -189,7 +191,8 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
-    /// Holds the input that `law` has here until `end`, or where samples are even and have come to lie elsewhere until the nearest.
+    /// Holds the input of `law` here until `end`; if samples are evenly spaced and `end` lies elsewhere, until the nearest
+    /// sample.
     fn hold_under(&mut self, law: impl Fn(&[f64], &mut [f64]), end: f64) -> Result<(), Failure> {
         let m = self.model.inputs();
         let (mut u, mut beside) = ([0.0; MAX_INPUTS], [0.0; MAX_INPUTS]);
@@ -208,18 +211,18 @@ impl<'a> Walk<'a> {
         if self.perturbed.note(&self.x) <= most { Ok(()) } else { Err(Failure::Unsteady) }
     }
 
-    /// The same of `u`, whatever the state is.
+    /// The same with `u`, whatever the state is.
     pub(super) fn hold_until(&mut self, u: &[f64], end: f64) -> Result<(), Failure> {
         self.hold_under(|_, held| held.copy_from_slice(u), end)
     }
 
-    /// Holds `u` until `end` or the nearest sample, and notes it.
+    /// Holds `u` until `end` or the nearest sample, and records it.
     fn hold_until_sample(&mut self, u: &[f64], end: f64) -> Result<(), Failure> {
         let Grid { period, even } = self.grid;
         let samples = ((end - self.started) / period + 0.5) as u64;
         let sample = self.started + samples as f64 * period;
         let end = if !even || (sample - end).abs() <= ON_TIME * period { end } else { sample };
-        // Time is too large to tell samples apart.
+        // Time is too large to distinguish samples.
         if end.is_nan() || end <= self.t {
             return Err(Failure::TooLong);
         }
@@ -265,7 +268,7 @@ impl<'a> Walk<'a> {
         self.backup_plan.rates[state] = self.backup_plan.rates[state].max(rate.abs());
         let period = self.grid.period;
         while self.t < end {
-            // The next sample; one that is here but for round-off has passed.
+            // The next sample. One that is here up to round-off has passed.
             let passed = ((self.t - self.started) / period + 1e-6) as u64;
             let sample = self.started + (passed + 1) as f64 * period;
             let sample = if sample < end - 1e-6 * period { sample } else { end };
@@ -286,7 +289,7 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
-    /// Moves on by a piece, to `node` at most.
+    /// Moves on by a piece, at most to `node`.
     fn advance(&mut self, u: &[f64], node: f64) -> Result<(), Failure> {
         self.pieces += 1;
         self.backup_plan.pieces = self.pieces;
@@ -299,7 +302,7 @@ impl<'a> Walk<'a> {
         }
         let whole = node - self.t;
         let mut dt = self.path.iter().fold(whole, |dt, c| expansion::reach(c, TRUNCATED * size(c), dt));
-        // Curvature that has cut the piece before short is still there.
+        // The curvature that shortened the previous piece is still there.
         dt = dt.min(self.longest);
         while !self.is_solution(u, dt) {
             dt *= 0.5;
@@ -314,7 +317,7 @@ impl<'a> Walk<'a> {
         self.longest *= self.growth;
         self.growth *= self.growth;
         let end = if dt < whole { self.t + dt } else { node };
-        // At a time so large that a piece is within its round-off.
+        // Time is so large that a piece is within its round-off.
         if end <= self.t {
             return Err(Failure::TooLong);
         }
@@ -327,7 +330,7 @@ impl<'a> Walk<'a> {
             let least = self.least(i, (&path, &over), (from, dt), HALVINGS);
             self.note(i, from, least)
         });
-        // What has failed is not followed further.
+        // After a failure nothing is followed further.
         if met.is_ok() {
             self.move_perturbed(u, &path, dt);
         }
@@ -338,7 +341,7 @@ impl<'a> Walk<'a> {
         met
     }
 
-    /// Whether the expansions of the states are a solution until `dt` s after their begin. Leaves what encloses them.
+    /// Whether the expansions of the states are a solution for `dt` s from their start. Leaves their enclosures.
     fn is_solution(&mut self, u: &[f64], dt: f64) -> bool {
         let plant = self.model.plant;
         self.over.clear();
@@ -360,7 +363,7 @@ impl<'a> Walk<'a> {
         false
     }
 
-    /// Writes what the expansion of each state misses its rate by `after` s after its begin to `rate`.
+    /// Writes the residual of each state's expansion against its rate, `after` s after its start, to `rate`.
     fn miss(&mut self, u: &[f64], after: f64) {
         for (x, c) in self.point.iter_mut().zip(&self.path) {
             *x = at(c, after);
@@ -371,8 +374,8 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// A number that h of requirement `i` does not fall below along the first `dt` s of `path`, which begins at `from` and is
-    /// enclosed by `over`.
+    /// A lower bound on h of requirement `i` along the first `dt` s of `path`, which begins at `from` and is enclosed by
+    /// `over`.
     fn least(
         &mut self,
         i: usize,
@@ -382,7 +385,7 @@ impl<'a> Walk<'a> {
     ) -> f64 {
         let (model, margin, needed) = (self.requirements[i].model, self.margin(i), self.least_of(i));
         let tightest = self.backup_plan.tightest.map_or(f64::INFINITY, |tightest| tightest.slack);
-        // Far from its edge no more need be known.
+        // Far from the edge, no more needs to be known.
         let time = Interval::new(from, from + dt);
         let lowest = model.value_over(time, over).map(|h| h.low);
         if let Some(low) = lowest.filter(|low| *low >= needed && low - margin >= tightest) {
@@ -407,11 +410,11 @@ impl<'a> Walk<'a> {
         let is_sharp =
             slack >= tightest || slack >= SHARP * (least - margin) || halvings + SHARPER <= HALVINGS;
         if least < needed {
-            // By what is missing, and not by what a long piece leaves open.
+            // Report the actual shortfall, not what a long piece leaves open.
             return least;
         }
         if bound >= needed && is_sharp || halvings == 0 {
-            // Whatever curves h between these instants: by what it takes on the piece, or by Taylor's theorem.
+            // The curvature of h between these instants, from its enclosure on the piece or by Taylor's theorem.
             let enclosed = lowest.filter(|low| *low < needed).map_or(f64::INFINITY, |low| {
                 h[EXPANSION_ORDERS - 1] =
                     model.last_over(time, over).map_or(f64::NEG_INFINITY, |last| last.low);
@@ -421,7 +424,7 @@ impl<'a> Walk<'a> {
                 return bound.min(least).min(enclosed);
             }
         }
-        // A half is as much work as a piece.
+        // A half takes as much work as a piece.
         self.pieces += 1;
         if self.pieces > self.most_pieces {
             return f64::NEG_INFINITY;
@@ -445,15 +448,15 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
-    /// Holds the input of `reference` here until `end`.
+    /// Holds the present input of `reference` until `end`.
     pub(super) fn follow_until(&mut self, reference: &Reference, end: f64) -> Result<(), Failure> {
         let Some(k) = reference.hold_at(self.t, self.grid.slack()) else { return Ok(()) };
         let (model, t) = (self.model, self.t);
         self.hold_under(|x, u| reference.input(&model, k, t, x, u), end)
     }
 }
-/// The error that a state may have on a piece where it is within `over`: far from the origin no more of it than near, but for
-/// round-off.
+/// The error that a state may have on a piece on which it is within `over`: no more of it far from the origin than near,
+/// except for round-off.
 fn allowed(over: Interval) -> f64 {
     RESIDUAL * (1.0 + (over.high - over.low)) + ROUND_OFF * over.low.abs()
 }

@@ -1,26 +1,28 @@
-//! How a number that has nearly died away goes on to move, from what it was at the ends of a few windows of time.
+//! Extrapolation of a number that has nearly died away, from its values at the ends of a few windows of time.
 
 use alloc::vec::Vec;
 
 use crate::interval::Interval;
 
-/// Instants of that way at which the plant has to be at an equilibrium, and h is looked at otherwise.
+/// Number of intervals between the instants of the extrapolation at which the plant has to be at an equilibrium, and h is
+/// evaluated if it is not enclosed.
 const PATH_INSTANTS: u32 = 32;
 
-/// How a number goes on to move, window of time by window: it creeps, above a series that dies away.
+/// The extrapolated motion of a number, window by window: a constant creep plus a series that dies away.
 #[derive(Clone, Copy)]
 pub(super) struct Motion {
-    /// Change in a window, and by how much that may be wrong.
+    /// Change per window, and the error bound on that.
     creep: f64,
     unsure: f64,
-    /// What the series comes to, and the most that it does on the way.
+    /// The sum of the series, and the most that it reaches on the way.
     end: f64,
     series: f64,
 }
 
 impl Motion {
-    /// That of a number that was `last` at the ends of the last four windows. What the first three changes and the last three
-    /// differ by on the creep, that may be wrong by. `None` where the changes do not die away.
+    /// The motion of a number with the values `last` at the ends of the last four windows and at their start. The first
+    /// three changes and the last three give two estimates of the creep, whose difference is part of its error bound. `None`
+    /// if the changes do not die away.
     pub(super) fn of(last: [f64; 5], round_off: f64) -> Option<Self> {
         let change = |k: usize| last[k + 1] - last[k];
         let [before, now] = [0, 1].map(|k| told_apart([change(k), change(k + 1), change(k + 2)], round_off));
@@ -28,27 +30,27 @@ impl Motion {
         Some(Self { creep, unsure: unsure + (creep - other).abs(), end, series })
     }
 
-    /// The most by which it moves in so many windows. A creep that leads inside counts too, since it may be a slow series that
-    /// will end.
+    /// The most by which it moves in `windows` windows. A creep towards the inside counts too, since it may be a slow series
+    /// that will end.
     pub(super) fn to_come(self, windows: f64) -> f64 {
         self.series + (self.creep.abs() + self.unsure) * windows
     }
 
-    /// Where a number that is at `x` is a `part` of the way on, of so many windows.
+    /// Where a number that is at `x` will be after a `part` of the next `windows` windows.
     pub(super) fn at(&self, x: f64, part: f64, windows: f64) -> f64 {
         x + (self.end + self.creep * windows) * part
     }
 
-    /// Where a number that is at `x` is, from so many windows on until as many.
+    /// Encloses a number that is at `x` from one number of windows on to another.
     pub(super) fn over(&self, x: f64, [from, to]: [f64; 2]) -> Interval {
         let (a, b, wide) = (self.creep * from, self.creep * to, self.series + self.unsure * to);
         Interval::new(x + a.min(b) - wide, x + a.max(b) + wide)
     }
 }
 
-/// What three changes in a row tell by Aitken's process if they are a geometric series and a constant creep: the creep, what
-/// round-off may hide of it, the sum of the series to come, and the most that it comes to on the way. `None` where what they
-/// change by does not die away.
+/// Splits three successive changes by Aitken's process, on the assumption that they are a geometric series plus a constant
+/// creep. Returns the creep, what round-off may hide of it, the sum of the series to come, and the most that it reaches on
+/// the way. `None` if the differences between the changes do not die away.
 fn told_apart([first, before, now]: [f64; 3], round_off: f64) -> Option<[f64; 4]> {
     let (bent, bends) = (before - first, now - before);
     if bends.abs() <= round_off {
@@ -64,7 +66,7 @@ fn told_apart([first, before, now]: [f64; 3], round_off: f64) -> Option<[f64; 4]
     })
 }
 
-/// The states at instants of their way, from where they are on for so many windows.
+/// The extrapolated states at instants of the next `windows` windows.
 pub(super) fn states_along(ahead: &[(f64, Motion)], windows: f64) -> impl Iterator<Item = Vec<f64>> {
     (0..=PATH_INSTANTS).map(move |instant| {
         let part = f64::from(instant) / f64::from(PATH_INSTANTS);
@@ -84,7 +86,7 @@ mod tests {
     }
 
     proptest! {
-        /// Of a geometric series above a creep, both of any sign and size, what is to come is known.
+        /// For a geometric series above a creep, both of any sign and size, what is to come is known.
         #[test]
         fn a_decay_and_a_creep_are_told_apart(
             decays in -1.0..1.0_f64,
@@ -98,11 +100,11 @@ mod tests {
             let moves = motion.to_come(f64::from(windows));
             let moved = (0..=windows).map(|k| (h(4 + k) - h(4)).abs()).fold(0.0, f64::max);
             prop_assert!(moves >= moved, "{moves} {moved}");
-            // No more than each by itself, and what round-off of 1e-14 hides in a creep.
+            // No more than each by itself, plus what round-off of 1e-14 hides in a creep.
             let apart = series(4).abs() * (1.0 - ratio) / (1.0 - ratio.abs());
             let apart = apart + creep.abs() * f64::from(windows);
             prop_assert!(moves <= apart + 1e-9 * f64::from(windows), "{moves} {apart}");
-            // And where it is meanwhile.
+            // And where it is in between.
             let half = windows / 2;
             for [from, to] in [[0, half], [half, windows]] {
                 let over = motion.over(h(4), [f64::from(from), f64::from(to)]);
@@ -122,7 +124,7 @@ mod tests {
         assert_eq!(to_come([1.0; 5], 1e-14), Some(0.0));
     }
 
-    /// A fast decay above a slow one does not hide a creep of the slow one's size.
+    /// A fast decay above a slow one does not hide a creep as large as the slow one.
     #[test]
     fn what_two_decays_hide_is_not_taken_as_known() {
         let power = |base: f64, k: u32| (0..k).map(|_| base).product::<f64>();

@@ -1,4 +1,5 @@
-//! A plant beside that of a roll-out, under the same law: whether a deviation that nobody could measure grows until the plan is lost.
+//! A perturbed copy of the plant of a rollout, under the same law: whether a deviation too small to measure grows until the
+//! plan is lost.
 
 use alloc::vec::Vec;
 
@@ -8,38 +9,41 @@ use crate::lie::Expansion;
 use crate::plan::expansion::{self, at};
 use crate::scalar::all_finite;
 
-/// How many times a deviation may grow on the way of a plan, and of one that was accepted before: what it begins with is what the
-/// expansions of the states miss, far more than round-off.
+/// How many times a deviation may grow along a new plan, and along one that was accepted before. It begins with the residual
+/// of the states' expansions, which is far more than round-off.
 pub(super) const SPREADS: [f64; 2] = [1e4, 1e6];
-/// Part of a state's size by which the plant is moved to see how a deviation grows. That size is 1, the way from where the walk began,
-/// and this part of the state itself: far from the origin a deviation is more than round-off, and a place no other place.
+/// Perturbation of the plant to see how a deviation grows, as a part of a state's size. That size is 1, plus the distance
+/// from where the rollout began, plus a part [`FAR`] of the state itself.
 const PERTURBATION: f64 = 1e-6;
+/// The part of a state that counts in its size: far from the origin a deviation still exceeds round-off, and a position does
+/// not depend on the choice of the origin.
 const FAR: f64 = 1e-6;
-/// The last term of a step along which the plant that was moved is followed, as a part of the deviation: (λτ)⁴/4 of a mode that
-/// grows with λ. And the shortest step, as a part of a piece.
+/// Largest last term of a step along which the perturbed plant is followed, as a part of the deviation: (λτ)⁴/4 of a mode
+/// that grows with λ.
 const BENT: f64 = 0.25;
+/// The shortest step, as a part of a piece.
 const SHORTEST: f64 = 1e-3;
-/// Each stage of Runge and Kutta: where in the step it is, what it counts, and its weight in the curvature.
+/// The stages of Runge and Kutta: each with its place in the step, its weight, and its weight in the curvature.
 const STAGES: [(f64, f64, f64); 4] =
     [(0.0, 1.0 / 6.0, 1.0), (0.5, 1.0 / 3.0, 0.0), (0.5, 1.0 / 3.0, -2.0), (1.0, 1.0 / 6.0, 1.0)];
 
-/// A plant beside that of a roll-out, under the same law.
+/// A perturbed copy of the plant of a rollout, under the same law.
 pub(super) struct Perturbed {
-    /// The state where the walk began.
+    /// The state where the rollout began.
     origin: Vec<f64>,
-    /// By how much its state and its input differ.
+    /// The difference of its state and of its input.
     pub(super) x: Vec<f64>,
     pub(super) u: [f64; MAX_INPUTS],
-    /// Room for a step: slopes of the difference, their mean, and the first less twice the third and the last.
+    /// Scratch for a step: slopes of the difference, their mean, and the first less twice the third plus the last.
     slope: Vec<f64>,
     mean: Vec<f64>,
     curvature: Vec<f64>,
-    /// How many times the difference has grown since some instant, at most.
+    /// The largest growth of the difference since any instant.
     grown: f64,
 }
 
 impl Perturbed {
-    /// Beside `x`, in a direction that is none of an axis.
+    /// Near `x`, in a direction that is not along an axis.
     pub(super) fn new(x: &[f64]) -> Self {
         Self {
             origin: x.to_vec(),
@@ -52,20 +56,20 @@ impl Perturbed {
         }
     }
 
-    /// Notes by how much the difference has grown, at `x`, and makes it as small again. Returns that growth.
+    /// Records by how much the difference has grown, at `x`, and rescales it to its original size. Returns that growth.
     pub(super) fn note(&mut self, x: &[f64]) -> f64 {
         let ratio = part(&self.x, x, &self.origin) / PERTURBATION;
         self.grown = (self.grown * ratio).max(1.0);
         match ratio > 0.0 && ratio < f64::INFINITY {
             true => self.x.iter_mut().for_each(|d| *d /= ratio),
-            // What is no number shows in the states soon enough.
+            // NaN soon shows in the states.
             false => self.x = away(x, &self.origin).collect(),
         }
         self.grown
     }
 }
 
-/// A deviation from `x` in a direction that is none of an axis.
+/// A deviation from `x` in a direction that is not along an axis.
 fn away(x: &[f64], origin: &[f64]) -> impl Iterator<Item = f64> {
     let sizes = x.iter().zip(origin).map(|(x, origin)| size_beside(*x, *origin));
     (0_u32..)
@@ -73,20 +77,20 @@ fn away(x: &[f64], origin: &[f64]) -> impl Iterator<Item = f64> {
         .map(|(i, size)| (1.0 - 2.0 * f64::from(i % 2)) * PERTURBATION * size / f64::from(1 + i))
 }
 
-/// The largest part of a state's size that a change `d` of it is, at `x`.
+/// The largest part that a change `d` is of a state's size, at `x`.
 fn part(d: &[f64], x: &[f64], origin: &[f64]) -> f64 {
     let parts = d.iter().zip(x.iter().zip(origin)).map(|(d, (x, origin))| d.abs() / size_beside(*x, *origin));
     parts.fold(0.0, f64::max)
 }
 
-/// What a deviation is small against.
+/// The size of a state, to which a deviation is compared.
 fn size_beside(x: f64, origin: f64) -> f64 {
     1.0 + (x - origin).abs() + FAR * x.abs()
 }
 
 impl Walk<'_> {
-    /// Moves the perturbed plant on by `dt` s, as that on `path` under `u` is: the difference of the two in steps of Runge
-    /// and Kutta.
+    /// Moves the perturbed plant on by `dt` s, together with the one on `path` under `u`: their difference takes steps of
+    /// Runge and Kutta.
     pub(super) fn move_perturbed(&mut self, u: &[f64], path: &[Expansion], dt: f64) {
         let Perturbed { origin, x: perturbed, u: more, slope, mean, curvature, .. } = &mut self.perturbed;
         let held: [f64; MAX_INPUTS] = core::array::from_fn(|i| u.get(i).map_or(0.0, |u| u + more[i]));
@@ -121,9 +125,9 @@ impl Walk<'_> {
         }
     }
 
-    /// Whether the plant has an expansion beside its state too, in one of four directions, by as much as that which is
-    /// moved: where a tank runs dry its rate has an infinite slope, and no expansion tells what comes after. A piece that
-    /// ends near such a place was cut short before it.
+    /// Whether the plant also has an expansion near its state, in one of four directions, at the distance of the
+    /// perturbation. Where a tank runs dry its rate has an infinite slope, and no expansion shows what comes after. A piece
+    /// that ends near such a place was cut short before it.
     pub(super) fn is_smooth_beside(&mut self, u: &[f64]) -> bool {
         if self.longest == f64::INFINITY || self.strictness <= 0.0 {
             return true;

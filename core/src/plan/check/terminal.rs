@@ -1,5 +1,5 @@
-//! The end of a plan: whether the plant stays for ever where the stopping law brings it to rest, or how the plan ends
-//! without an equilibrium.
+//! The end of a plan: whether the plant stays for ever where the stopping controller brings it to an equilibrium, or how the
+//! plan ends without an equilibrium.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -14,29 +14,29 @@ use crate::plan::law::{Reference, StoppingController};
 use crate::plan::model::{differences, largest_eigenvalue};
 use crate::plan::{Failure, Integral, Requirement};
 
-/// Rate of the state that counts as an equilibrium, as a part of the largest on the way.
+/// Largest rate of a state that counts as an equilibrium, as a part of its largest along the plan.
 const AT_EQUILIBRIUM: f64 = 1e-6;
-/// Number of holds for which a drift at an equilibrium has to leave every set where it is.
+/// Number of holds over which a drift at an equilibrium must not leave any set.
 const DRIFT: f64 = 1e3;
-/// Holds of the stopping controller in which what is left at an equilibrium is followed.
+/// Number of holds of the stopping controller over which the remaining motion at an equilibrium is followed.
 const SETTLING: usize = 128;
-/// Halvings of the way of the states that is left at an equilibrium, on which h is enclosed.
+/// Halvings of the extrapolated motion of the states at an equilibrium, over which h is enclosed.
 const PATH_HALVINGS: u32 = 6;
-/// What h changes by in one of them for that to be round-off, as a part of what it is made of.
+/// Change of h in one window that is round-off, as a part of the numbers that h is computed from.
 const SETTLED: f64 = 64.0 * f64::EPSILON;
-/// Part of a state's size by which it is moved to see whether a deviation from an equilibrium grows, and by what part of it
-/// that may in all the time that is promised.
+/// Perturbation of a state to see whether a deviation from an equilibrium grows, as a part of its size.
 const BESIDE: f64 = 1e-5;
+/// Largest growth of that deviation, as a part of it, over all the time that is promised.
 const GROWS: f64 = 0.1;
-/// Most pieces in which a hold of the stopping controller at an equilibrium is followed, and the part of one that a kink is
-/// passed in.
+/// Largest number of pieces in which a hold of the stopping controller at an equilibrium is followed.
 const CREPT: u32 = 1000;
+/// The part of a piece in which a kink is passed.
 const KINK: f64 = 1.0 / 16.0;
-/// The time in s for which what does not die away has to leave every set where it is.
+/// The time in s for which a motion that does not die away must not leave any set.
 const LONG: f64 = 1e5;
-/// Most holds of the stopping controller after a reference.
+/// Largest number of holds of the stopping controller after a reference.
 const STOPPING_HOLDS: usize = 200;
-/// Later times at which a set that does not move has the same h: in units of the plan's length, and in s.
+/// Later times at which a set that does not move has the same h: as parts of the plan's length, and in s.
 const LATER: [[f64; 4]; 2] = [[0.1234, 0.618, 1.7, 3.3], [3.7, 61.7, 1013.0, 86413.0]];
 
 impl Walk<'_> {
@@ -46,7 +46,7 @@ impl Walk<'_> {
         let hold = stopping.hold.max(self.grid.period);
         let (mut failure, mut due, mut wait) = (Failure::NoRest, 0, 1);
         for k in 0..STOPPING_HOLDS {
-            // Followed far ahead is what stands still, and where it did not stay not again at every hold.
+            // Only a plant that stands still is followed far ahead. If it did not stay, this is not repeated at every hold.
             let equilibrium =
                 match self.is_still(stopping, hold, &mut u) && (k >= due || k + 1 == STOPPING_HOLDS) {
                     true => {
@@ -60,15 +60,15 @@ impl Walk<'_> {
             match equilibrium {
                 Ok(true) => return Ok(BackupPlan { until: f64::INFINITY, ..self.backup_plan }),
                 Ok(false) => {}
-                // What still drifts out may do so no longer a hold later.
+                // A plant that still drifts out may no longer do so a hold later.
                 Err(drifts_out) => failure = drifts_out,
             }
         }
         Err(failure)
     }
 
-    /// Ends where `reference` does, without an equilibrium, if that was still ahead. Its last input is held until then
-    /// where samples lie beside its own.
+    /// Ends where `reference` does, without an equilibrium, if that end was still ahead. If samples lie beside those of the
+    /// reference, its last input is held until then.
     pub(in crate::plan) fn end(mut self, reference: &Reference) -> Result<BackupPlan, Failure> {
         let (Some(&until), slack) = (reference.times.last(), self.grid.slack()) else {
             return Err(Failure::NoRest);
@@ -84,7 +84,7 @@ impl Walk<'_> {
         Ok(BackupPlan { until, ..self.backup_plan })
     }
 
-    /// Whether the plant is at an equilibrium here, where it can stay for ever, so that a plan may end.
+    /// Whether the plant is at an equilibrium here at which it can stay for ever, so that a plan may end.
     pub(in crate::plan) fn may_end(&mut self, stopping: &StoppingController) -> bool {
         let (mut u, tightest) = (vec![0.0; self.model.inputs()], self.backup_plan.tightest);
         let hold = stopping.hold.max(self.grid.period);
@@ -94,9 +94,10 @@ impl Walk<'_> {
         ends
     }
 
-    /// Whether the plant that stands still under `u`, the input of `stopping`, can stay here for ever. Notes what is tightest there.
+    /// Whether the plant, which stands still under the input `u` of `stopping`, can stay here for ever. Records the tightest
+    /// place.
     fn stays(&mut self, stopping: &StoppingController, hold: f64, u: &[f64]) -> Result<bool, Failure> {
-        // Not at the edge of a set, where a margin has to be there later.
+        // Not at the edge of a set where a margin has to be there later.
         if !(0..self.requirements.len()).all(|i| self.is_firm(i)) {
             return Ok(false);
         }
@@ -124,7 +125,7 @@ impl Walk<'_> {
         self.rate.iter().enumerate().all(|(i, rate)| rate.abs() <= small(i))
     }
 
-    /// Whether a plant at an equilibrium here stays in all sets though it may creep on under the stopping controller.
+    /// Whether a plant at an equilibrium here stays in all sets, though it may creep on under the stopping controller.
     fn settles(&mut self, stopping: &StoppingController, hold: f64) -> bool {
         let (mut x, mut u) = (self.x.clone(), vec![0.0; self.model.inputs()]);
         let (requirements, t) = (self.requirements, self.t);
@@ -154,7 +155,7 @@ impl Walk<'_> {
             }
             let size = x.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
             let last = |seen: &dyn Fn(usize) -> f64| [4, 3, 2, 1, 0].map(|back| seen(holds - back * window));
-            // The remainder of a plan is asked for half as long, so that time may pass.
+            // The remainder of a plan has to stay only half as long, so that time may pass.
             let windows = |i: usize| {
                 let time = (self.requirements[i].until - self.t).min(LONG * self.strictness);
                 time / (hold * window as f64)
@@ -167,7 +168,8 @@ impl Walk<'_> {
             if !stays {
                 continue;
             }
-            // What curves h further on the way of the states has not shown yet, nor what a state does that gathers pace.
+            // Two effects have not shown yet: curvature of h farther along the motion of the states, and a state that
+            // accelerates.
             let ahead = |j: usize| {
                 let motion = Motion::of(last(&|k| states[k][j]), SETTLED * (size + x[j].abs()));
                 motion.map(|motion| (x[j], motion))
@@ -195,7 +197,7 @@ impl Walk<'_> {
         largest_eigenvalue(&moved)
     }
 
-    /// Moves `x` on by `duration` s under `u`, of which an integral counts with its mean.
+    /// Moves `x` on by `duration` s under `u`; an integral counts with its mean.
     pub(in crate::plan) fn run(&mut self, x: &mut [f64], u: &[f64], duration: f64) {
         let Some(Integral { state, input }) = self.model.integral else { return self.creep(x, u, duration) };
         let mut held = u.to_vec();
@@ -206,13 +208,13 @@ impl Walk<'_> {
         x[state] = end;
     }
 
-    /// Moves `x` on by `duration` s under `u`, to round-off: by expansions of the states, past a kink that breaks them in a
-    /// step of the model.
+    /// Moves `x` on by `duration` s under `u`, to round-off: by expansions of the states, or by a step of the model across a
+    /// kink that breaks them.
     fn creep(&mut self, x: &mut [f64], u: &[f64], duration: f64) {
         let (plant, mut left) = (self.model.plant, duration);
         for _ in 0..CREPT {
             plant.path(x, u, &mut self.path);
-            // However fast something dies away, its expansion is as short as that.
+            // The faster a motion dies away, the shorter its expansion is.
             let smooth = self.path.iter().fold(left, |dt, c| expansion::reach(c, ROUND_OFF * size(c), dt));
             let mut dt = smooth;
             let is_followed = loop {
@@ -238,8 +240,8 @@ impl Walk<'_> {
         self.model.flow(x, u, left);
     }
 
-    /// Whether requirement `i` is met as the states move on, for so many windows of time: each from where it is by its motion.
-    /// Of a set that moves, and of a source without enclosures, at instants.
+    /// Whether requirement `i` is met as the states move on, each by its motion, for `windows` windows of time. For a set
+    /// that moves, or a source without enclosures, it is checked at instants.
     fn stays_ahead(&self, i: usize, ahead: &[(f64, Motion)], windows: f64) -> bool {
         let Requirement { model, from, .. } = self.requirements[i];
         let begin = self.t.max(from);
@@ -253,14 +255,14 @@ impl Walk<'_> {
         }
     }
 
-    /// The same by enclosures of h, from so many windows on until as many.
+    /// The same by enclosures of h, from one number of windows on to another.
     fn encloses(&self, i: usize, ahead: &[(f64, Motion)], [from, to]: [f64; 2], halvings: u32) -> bool {
         let over = ahead.iter().map(|(x, motion)| {
             let mut over = [Interval::ALL; EXPANSION_ORDERS];
             over[0] = motion.over(*x, [from, to]);
             over
         });
-        // A set that does not move where the plant is now may do so farther on: at all times.
+        // A set that does not move at the present state may move farther on, so all times count.
         let h = self.requirements[i].model.value_over(Interval::ALL, &over.collect::<Vec<_>>());
         // NaN is not large enough.
         if h.is_some_and(|h| h.low >= self.least_of(i)) {
@@ -272,7 +274,7 @@ impl Walk<'_> {
     }
 
     /// Whether the plant is still at an equilibrium under the input of `stopping` as the states move on: a force that grows
-    /// on their way has not shown yet.
+    /// along their motion has not shown yet.
     fn is_equilibrium_ahead(
         &mut self,
         stopping: &StoppingController,
@@ -287,8 +289,8 @@ impl Walk<'_> {
         })
     }
 
-    /// Whether a plant at an equilibrium here stays in all sets that are or will be asked for: they are still, or it is
-    /// known how near they come.
+    /// Whether a plant at an equilibrium here stays in all sets that are required now or later: either they do not move, or
+    /// it is known how near they come.
     fn is_equilibrium(&mut self, u: &[f64], hold: f64) -> Result<bool, Failure> {
         let length = (self.t - self.started).max(self.grid.period);
         self.model.plant.path(&self.x, u, &mut self.path);

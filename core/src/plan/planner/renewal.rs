@@ -1,4 +1,4 @@
-//! Another plan behind an input, between samples: the current one moved in time, or a few steps of a search.
+//! Another plan behind an input, between samples: the current one moved in time, or found by a few steps of a search.
 
 use alloc::sync::Arc;
 use alloc::vec;
@@ -13,44 +13,44 @@ use crate::plan::{BackupPlan, Failure};
 use crate::plan::{Plan, Requirement};
 use crate::scalar::all_finite;
 
-/// The holds of the grid until the last deadline and after it.
+/// The number of holds of the grid until the last deadline and after it.
 const HOLDS: [usize; 2] = [20, 10];
-/// The quadratic programs for which a guess is followed.
+/// The number of quadratic programs for which a guess is pursued.
 const FOLLOWED: u32 = 15;
-/// What is left of a violation after a sample where it is worth another.
+/// A guess is pursued further if a sample leaves less than this part of its violation.
 const LEFT: f64 = 0.8;
-/// The parts of the time until the last deadline for which a guess holds the input that is wanted.
+/// The parts of the time until the last deadline for which a guess holds the wanted input.
 const WANTED: [f64; 2] = [0.35, 0.1];
 
 /// Writes an input at a time in s and a state.
 type Law<'a> = &'a dyn Fn(f64, &[f64], &mut [f64]);
 
-/// A search for a plan behind an input that is spread over samples: which guess it is at, and how far that has come.
+/// The progress of a search for a plan behind an input that is spread over samples: the guess, and how far it has come.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct SearchProgress {
-    /// The number of the guess, and of the quadratic programs for which it was followed.
+    /// The number of the guess, and the number of quadratic programs for which it has been pursued.
     guess: u32,
     followed: u32,
-    /// The end of each hold in s and its input, and how much is violated with them.
+    /// The end of each hold in s and its input, and the remaining violation under these inputs.
     inputs: Vec<(f64, [f64; MAX_INPUTS])>,
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     violation: f64,
 }
 
 impl SearchProgress {
-    /// The number of guesses: how the current plan is followed, the input itself and then to an equilibrium, and the first
-    /// of a search.
+    /// The number of guesses: one that follows the current plan, some that hold the input itself and then lead to an
+    /// equilibrium, and the first ones of a search.
     const GUESSES: u32 = 12;
 
-    /// Whether it is one of a search, of which every number is finite.
+    /// Whether it cannot be the progress of a search, has a time or input that is not finite, or a violation that is NaN.
     pub(crate) fn is_flawed(&self) -> bool {
         self.guess >= Self::GUESSES
             || self.violation.is_nan()
             || self.inputs.iter().any(|(end, u)| !end.is_finite() || !all_finite(u))
     }
 
-    /// Goes on after a sample with `descent` on the grid `times`, or to the next guess. Whether there is one.
+    /// Continues after a sample with `descent` on the grid `times`, or with the next guess. Returns whether there is one.
     fn next(&mut self, programs: u32, descent: Option<(&Descent, &[f64])>) -> bool {
         let is_first = self.followed == 0;
         self.followed = self.followed.saturating_add(programs);
@@ -70,19 +70,19 @@ impl SearchProgress {
 }
 
 impl Planner<'_> {
-    /// `plan`, followed from the place on its way that is nearest to where `u` leads from `x` at `t` in one period: whoever is ahead
-    /// of a plan is not off it.
+    /// `plan`, followed from the place on its trajectory that is nearest to where `u` leads from `x` at `t` in one period: a
+    /// state ahead of a plan is not off the plan.
     ///
     /// # Errors
     ///
-    /// What it fails at.
+    /// Why it fails.
     pub(crate) fn moved(&self, plan: &Plan, t: f64, x: &[f64], u: &[f64]) -> Result<Plan, Failure> {
         let moved = self.led_by(plan, t, x, u)?.0.ok_or(Failure::Nothing)?;
         let backup_plan = self.behind(&moved, t, x, u)?;
         Ok(Plan { backup_plan, ..moved })
     }
 
-    /// `plan` moved in time, where that changes it, and the state to which `u` leads.
+    /// `plan` moved in time, if that changes it, and the state to which `u` leads.
     fn led_by(&self, plan: &Plan, t: f64, x: &[f64], u: &[f64]) -> Result<(Option<Plan>, Vec<f64>), Failure> {
         let reference = plan.reference.as_ref().filter(|_| !plan.is_finite()).ok_or(Failure::Nothing)?;
         let mut at = x.to_vec();
@@ -94,12 +94,12 @@ impl Planner<'_> {
         Ok((moved, at))
     }
 
-    /// A plan that begins with `u` for one period from `x` at `t`, by the next few steps of a search that `progress` remembers. It
-    /// begins with how `plan` is followed from there. `None` where they lead to none; whether guesses are left then.
+    /// A plan that begins with `u` for one period from `x` at `t`, by the next few steps of a search whose progress is in
+    /// `progress`. The search begins by following `plan` from there.
     ///
     /// # Errors
     ///
-    /// Whether the search goes on, where these steps lead to no plan.
+    /// If these steps lead to no plan: whether the search continues.
     pub(crate) fn renewed(
         &self,
         plan: &Plan,
@@ -123,11 +123,11 @@ impl Planner<'_> {
         })
     }
 
-    /// A plan from `x` at `t`, by the next few steps of such a search: where `plan` is one no more.
+    /// A plan from `x` at `t`, by the next few steps of the same search, once `plan` is no longer a plan.
     ///
     /// # Errors
     ///
-    /// Whether the search goes on, where these steps lead to no plan.
+    /// If these steps lead to no plan: whether the search continues.
     pub(crate) fn regained(
         &self,
         plan: &Plan,
@@ -143,7 +143,7 @@ impl Planner<'_> {
         }
     }
 
-    /// Steps of that search from `x` at `t`: a plan, or how far it has come on which grid. `None` where there is no search.
+    /// Steps of that search from `x` at `t`. Returns a plan, or the progress and its grid; `None` if there is no search.
     fn step_on(
         &self,
         plan: &Plan,
@@ -202,7 +202,7 @@ impl Planner<'_> {
             sizes: vec![0.0; self.requirements.len()],
         };
         let mut descent = Descent::from(search.run(inputs));
-        // Half of them, a check, and the others.
+        // Half of the programs, a check, and the other half.
         for iterations in [self.programs.div_ceil(2), self.programs / 2] {
             search.improve(&mut descent, iterations);
             if descent.best.violation > WORTH {
@@ -216,7 +216,7 @@ impl Planner<'_> {
             let grid = Grid { period: paced.period, even: true };
             match paced.walk(&found, 1.0, grid, (t, x), None, true) {
                 Ok(backup_plan) => return Some(Ok(Plan { backup_plan, ..found })),
-                // What is broken between the nodes is asked for with more margin at them.
+                // A requirement broken between the nodes gets more margin at the nodes.
                 Err(Failure::Broken { barrier, slack, .. }) => search.tighten(barrier, slack, &descent.best),
                 Err(_) => break,
             }

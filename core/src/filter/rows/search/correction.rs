@@ -1,31 +1,33 @@
-//! A few corrections from u_ref, for rows that are all but affine between u_ref and the answer: the usual step.
+//! A few corrections from u_ref, for rows that are almost affine between u_ref and the answer: the usual step.
 //!
-//! With G(u) the answer of the QP whose rows are linearised at u, the answer is where G(u) = u. The corrections
-//! u_{k+1} = G(u_k) begin at u_ref, where the rows have been linearised to see whether they hold. Let ρ be the largest ratio of
-//! a way G(u_k) − u_k to the one before. It is the part by which the rows' normals turn on the way from u_ref. From the
-//! second correction on, the secant through the last two is taken (Anderson's method of depth one), so that a ρ of a tenth costs
-//! a correction or two. The last G(u_k) is the answer once ρ times its way is a tenth of what counts as met: the next
+//! With G(u) the answer of the QP whose rows are linearised at u, the answer is where G(u) = u. The corrections u_{k+1} =
+//! G(u_k) begin at u_ref, where the rows have been linearised to see whether they hold. Let ρ be the largest ratio of a step
+//! G(u_k) − u_k to the one before. It is the part by which the rows' normals turn on the way from u_ref. From the second
+//! correction on, the secant through the last two is used (Anderson's method of depth one), so that a ρ of a tenth costs a
+//! correction or two. The last G(u_k) is the answer once ρ times its step is a tenth of what counts as met: the next
 //! correction would not be longer.
 //!
-//! Only rows that are active or violated are linearised on the way, the others at the end. The answer is accepted if every
-//! row holds, no other is in sight sideways, and the last input leads to it too, or is no nearer to u_ref, or is too near
-//! for the rows to curve on the way there. Else the search starts over from its two guesses.
+//! Only rows that are active or violated are linearised along the way, the others at the end. The answer is accepted if
+//! every row holds, no other answer is in sight sideways, and one of three conditions holds: the last input leads to it too,
+//! or is no nearer to u_ref, or is too near for the rows to curve on the way there. Otherwise the search starts over from
+//! its two guesses.
 
 use super::{CONTRACTION, FAR, Linearised, MET, PeriodProblem, SAME, active};
 use crate::MAX_INPUTS;
 use crate::qp::{Outcome, RowSet, Solution, Workspace};
 
-/// Corrections of an answer whose rows are all but affine.
+/// Largest number of corrections of an answer whose rows are almost affine.
 pub(super) const CORRECTIONS: usize = 12;
 /// Length of a correction that is left out, as a part of what counts as met.
 pub(super) const SKIPPED: f64 = 0.1;
 /// Largest ratio of each correction to the one before.
 pub(super) const CONVERGING: f64 = 0.5;
 
-/// Answer and way of a correction, and the length of the way.
+/// Answer and step of a correction, and the length of the step.
 type Correction<const N: usize> = ([f64; N], [f64; N], f64);
 
-/// The part of the way back from a correction's answer to that of the one before at which the `way` left would be least.
+/// The part of the way back, from a correction's answer to that of the one before, at which the remaining `way` would be
+/// least.
 #[inline(always)]
 fn secant(way: &[f64], before: &[f64]) -> f64 {
     let (mut product, mut square) = (0.0, 0.0);
@@ -38,10 +40,10 @@ fn secant(way: &[f64], before: &[f64]) -> f64 {
 }
 
 impl PeriodProblem<'_> {
-    /// The answer, written to `u`, where all hard rows can be met and are all but affine between u_ref and there. It is the
-    /// limit of the QP's answers, each for the rows linearised at the one before, from u_ref on. There the rows are
-    /// linearised but for `unseen` ones. `watched` are linearised all along, the others at the end. `None` where the
-    /// answers do not come nearer fast, or others may exist.
+    /// The answer, written to `u`, if all hard rows can be met and are almost affine between u_ref and there. It is the
+    /// limit of the QP's answers from u_ref on, each for the rows linearised at the one before. At u_ref the rows are
+    /// linearised, except `unseen` ones. `watched` are linearised all along, the others at the end. `None` if the answers do
+    /// not converge fast, or others may exist.
     #[inline(always)]
     pub(super) fn correct<const N: usize>(
         &self,
@@ -128,22 +130,23 @@ impl PeriodProblem<'_> {
         None
     }
 
-    /// Whether the rows, whose normals turn by the part `ratio` of themselves on the `distance` of `u` from u_ref, are all but
-    /// affine there and on the way to `last`, or `last` is no nearer to u_ref.
+    /// Whether the rows, whose normals turn by the part `ratio` of themselves on the `distance` of `u` from u_ref, are
+    /// almost affine there and on the way to `last`, or `last` is no nearer to u_ref.
     #[inline(always)]
     pub(super) fn is_near(&self, last: &[f64], u: &[f64], distance: f64, ratio: f64) -> bool {
         let near = || distance <= (1.0 + MET) * self.distance(last);
         ratio <= CONTRACTION && (self.is_close(last, u, distance, ratio) || near())
     }
 
-    /// Whether the rows are all but affine on the way from `last` to `u`, as for [`Self::is_near`].
+    /// Whether the rows are almost affine on the way from `last` to `u`, as for [`Self::is_near`].
     #[inline(always)]
     pub(super) fn is_close(&self, last: &[f64], u: &[f64], distance: f64, ratio: f64) -> bool {
         let away = u.iter().zip(last).fold(0.0, |d: f64, (a, b)| d.max((a - b).abs()));
         ratio * away <= CONTRACTION * distance
     }
 
-    /// Whether there is no other answer near `u`, which corrections approached in `ratio`, or nearer to u_ref towards `last`.
+    /// Whether there is no other answer near `u`, which corrections approached in `ratio`, or nearer to u_ref towards
+    /// `last`.
     fn is_sole(
         &self,
         u: &[f64],

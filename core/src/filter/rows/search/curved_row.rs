@@ -6,66 +6,68 @@
 //! u − u_ref = λ ∇r(u),   r(u) = 0,   λ > 0.                                                            (K)
 //! ```
 //!
-//! At an input u with r and ∇r = a there, r is taken for the quadratic r + aᵀs + ½ sᵀHs of the way s from u, and (K) of that
-//! is solved: s = (I − λH)⁻¹(λa + u_ref − u), with λ by Newton's method on the one equation that is left. The Hessian H is
-//! learned on the way. It is 0 before, and then changes as little as it must for H s to be the change of ∇r (Powell's
-//! symmetric update; J. Nocedal and S. Wright, *Numerical Optimization*, 2nd ed., section 6.2). So the steps shorten faster
-//! and faster. The last is taken once the next, shorter in the same ratio, would be a tenth of what counts as met.
+//! At an input u with r and ∇r = a there, r is replaced by the quadratic r + aᵀs + ½ sᵀHs in the step s from u, and (K) is
+//! solved for that: s = (I − λH)⁻¹(λa + u_ref − u), with λ by Newton's method on the one equation that is left. The Hessian
+//! H is learned along the way. It starts at 0, and then changes as little as it must for H s to be the change of ∇r
+//! (Powell's symmetric update; J. Nocedal and S. Wright, *Numerical Optimization*, 2nd ed., section 6.2). So the steps
+//! shorten faster and faster. The last is taken once the next, shorter in the same ratio, would be a tenth of what counts as
+//! met.
 //!
-//! It begins at the answer of the pointwise row, and H with the change of ∇r from u_ref to there. Where the sample before
-//! has left its H ([`Curvature`]), it begins at u_ref with that, and is there in a step or two: what H s misses the change of ∇r by
-//! tells how far it has gone stale. An old H never makes an answer, it only shortens the way to it.
+//! The search begins at the answer of the pointwise row, and H with the change of ∇r from u_ref to there. If the previous
+//! sample has left its H ([`Curvature`]), the search begins at u_ref with that, and arrives in a step or two. The difference
+//! between H s and the change of ∇r shows how stale that H is. An old H never determines an answer, it only shortens the way
+//! to it.
 //!
-//! The answer is accepted under the terms of [`correction`](super::correction): the rows are all but affine from u_ref to
-//! there, every other row holds, and no other answer is in sight. λH, without a unit, is how far the normal turns on the
-//! way from u_ref. What r and ∇r at u_ref miss those at the answer by tells it too. A row that turns further is accepted
-//! too where it is curved inwards: where no eigenvalue of λH is large and positive, the quadratic has one answer, and what
-//! r and ∇r at u_ref miss *its* values by is small. So curves the row of a vehicle that heads for its goal over a long
-//! period. Where the answer goes on from that of the sample before, it is looked around for others every [`GOES_ON`]th time
-//! only.
+//! The answer is accepted under the terms of [`correction`](super::correction): the rows are almost affine from u_ref to
+//! there, every other row holds, and no other answer is in sight. λH, which has no unit, is how far the normal turns on the
+//! way from u_ref. The differences of r and ∇r at u_ref from the linear model at the answer show it too. A row that turns
+//! further is also accepted if it is curved inwards: no eigenvalue of λH is large and positive, so that the quadratic has
+//! one answer, and r and ∇r at u_ref differ little from the values of the *quadratic*. The row of a vehicle that heads for
+//! its goal over a long period is curved like that. If the answer continues that of the previous sample, other answers are
+//! looked for only every [`GOES_ON`]th time.
 
 use super::correction::{CONVERGING, CORRECTIONS, SKIPPED};
 use super::{CONTRACTION, FAR, Linearised, MET, PeriodProblem, SAME, norm};
 use crate::qp::{Outcome, Row, RowSet, Solution, Solver, Workspace};
 use crate::{MAX_INPUTS, elementary};
 
-/// The least square of the part of a step sideways, as a part of the step's, for it to show how the row curves sideways.
+/// The least square of the sideways part of a step, as a part of the step's, at which it shows how the row curves sideways.
 const SIDEWAYS_OF_STEP: f64 = 0.05;
-/// A step over the product of the two before it with the turn of the normal per distance, at most: three to four times what
-/// vehicles show, over a third of what counts as met. Over what a kept curvature is seen to be off by, as much.
+/// Largest ratio of a step to the product of the two before it and the turn of the normal per distance: three to four times
+/// what vehicles show, over a third of what counts as met. The same for a step over the observed error of a kept curvature.
 const SECANT: f64 = 30.0;
 /// The shortest step, as a part of the input, that shows a curvature beyond round-off.
 const TELLING: f64 = 1e-7;
 /// The next change of λ in Newton's method, as a part of it, that is left out: 3/2 λH times the square of the last one.
 const ROOT: f64 = SKIPPED * MET;
-/// Steps of Newton's method for λ.
+/// Largest number of steps of Newton's method for λ.
 const MULTIPLIER_STEPS: usize = 12;
 
-/// Samples in a row whose answers go on from the one before without a look around for others.
+/// Number of consecutive samples whose answers continue the previous one without a search for others.
 const GOES_ON: u32 = 8;
-/// The most inputs with which a row is searched with its curvature.
+/// The largest number of inputs with which a row is searched with its curvature.
 const INPUTS: usize = 3;
 
 type Matrix<const M: usize> = [[f64; M]; M];
 
-/// How the only active row of a sample curves: the memory from which the search of the next sample begins.
+/// The curvature of the only active row of a sample: the memory from which the search of the next sample begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Curvature {
     /// The number of the barrier that the row belongs to.
     pub barrier: u32,
-    /// Second derivatives of the row by the inputs, for each second of the period, in `[h]`/(sⁿ⁺¹ · unit of u²): of
-    /// inputs 1 and 1, 2 and 1, 2 and 2, 3 and 1, …; zeros above the number of inputs.
+    /// Second derivatives of the row with respect to the inputs, for each second of the period, in `[h]`/(sⁿ⁺¹ · unit of
+    /// u²): of inputs 1 and 1, 2 and 1, 2 and 2, 3 and 1, …; zeros above the number of inputs.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub hessian: [f64; INPUTS * (INPUTS + 1) / 2],
-    /// Samples since other answers were looked for, from 8 on: the next one looks.
+    /// Samples since other answers were looked for; from 8 on, the next sample looks.
     pub looked: u32,
-    /// Samples since a step sideways of the line from u_ref has shown how the row curves there; `None` where none ever has.
+    /// Samples since a step sideways of the line from u_ref has shown how the row curves there; `None` if none ever has.
     pub sideways: Option<u32>,
 }
 
 impl Curvature {
-    /// The second derivatives over a period of so many `seconds`.
+    /// The second derivatives over a period of that many `seconds`.
     #[inline(always)]
     fn over<const M: usize>(&self, seconds: f64) -> Matrix<M> {
         let at = |i: usize, j: usize| self.hessian[i * (i + 1) / 2 + j];
@@ -103,7 +105,7 @@ fn largest<const M: usize>(a: &[f64; M]) -> f64 {
     largest
 }
 
-/// The row as a quadratic function of the way from an input.
+/// The row as a quadratic function of the step from an input.
 struct Bent<const M: usize> {
     value: f64,
     normal: [f64; M],
@@ -117,7 +119,7 @@ impl<const M: usize> Bent<M> {
         core::array::from_fn(|i| product(&self.hessian[i], s))
     }
 
-    /// Changes the Hessian by as little as makes `H s` the change `y` of the normal.
+    /// Changes the Hessian as little as possible so that `H s` is the change `y` of the normal.
     #[inline(always)]
     fn learn(&mut self, s: &[f64; M], y: &[f64; M]) {
         let known = self.turn(s);
@@ -131,8 +133,8 @@ impl<const M: usize> Bent<M> {
         }
     }
 
-    /// Changes the Hessian along a direction sideways of an answer by what makes the value there and on the opposite side
-    /// sum up to `values`. Returns whether that is a number: where not, nothing has been learned.
+    /// Changes the Hessian along a direction sideways of an answer so that the values there and on the opposite side add up
+    /// to `values`. Returns whether these are numbers; if not, nothing has been learned.
     #[inline(always)]
     fn learn_sideways(&mut self, way: &[f64], values: f64) -> bool {
         let Some(s) = way.first_chunk::<M>() else { return false };
@@ -170,8 +172,8 @@ impl<const M: usize> Bent<M> {
         true
     }
 
-    /// The way to the answer of (K), and λ, where u_ref is at `back` from here. `None` where an eigenvalue of λH is not small
-    /// and positive.
+    /// The step to the answer of (K), and λ, with u_ref at `back` from here. `None` if an eigenvalue of λH is positive and
+    /// not small.
     #[inline(always)]
     fn nearest(&self, back: &[f64; M]) -> Option<([f64; M], f64)> {
         /// The largest square of λH.
@@ -189,7 +191,8 @@ impl<const M: usize> Bent<M> {
         // NaN is not small.
         let is_small = |turn: f64| matches!(turn, 0.0..=SMALL);
         if !is_small(lambda * lambda * size) {
-            // Where the row is curved inwards what is missing is concave in λ. From the first term on, which is too small, λ grows.
+            // If the row is curved inwards, the remainder is concave in λ. λ grows from the first term on, which is too
+            // small.
             lambda = -value / square;
         }
         for _ in 0..MULTIPLIER_STEPS {
@@ -197,7 +200,7 @@ impl<const M: usize> Bent<M> {
             if !is_small(turn) && !self.is_curved_inwards(lambda, CONVERGING) {
                 return None;
             }
-            // ∇r there is w/λ, so that H w is what it differs from c by.
+            // ∇r there is w/λ, so H w is its difference from c.
             let (there, rate) = inverse.at(lambda);
             let moved: [f64; M] = core::array::from_fn(|i| there[i] + lambda * rate[i]);
             let both = core::array::from_fn(|i| c[i] + there[i]);
@@ -268,8 +271,8 @@ impl<const M: usize> Resolvent<M> {
 }
 
 impl PeriodProblem<'_> {
-    /// The answer, written to `u`, where one hard row alone is active in it and is all but affine between u_ref and
-    /// there. `None`, with `u` as it may be, where it is not known to be so.
+    /// The answer, written to `u`, if only one hard row is active in it and that row is almost affine between u_ref and
+    /// there. `None`, with an arbitrary `u`, if this is not known to be so.
     pub(super) fn curved_row(
         &self,
         u: &mut [f64],
@@ -309,7 +312,7 @@ impl PeriodProblem<'_> {
         if at_reference.value >= -MET * (at_reference.terms + moved) {
             return None;
         }
-        // From the answer of the pointwise row, or of the row with the curvature that it had, to that of the row itself.
+        // From the answer of the pointwise row, or of the row with its earlier curvature, to that of the row itself.
         let mut row = Bent { value: at_reference.value, normal, hessian: [[0.0; M]; M] };
         let mut step: [f64; M] = core::array::from_fn(|i| u[i] - u_ref[i]);
         let (mut length, mut ratio) = (f64::INFINITY, 0.0_f64);
@@ -335,7 +338,7 @@ impl PeriodProblem<'_> {
             if rounds == 0 {
                 (way, turned) = (step, change);
             } else {
-                // The part of the step sideways of the line from u_ref, with the part of the turn that is its own.
+                // The part of the step sideways of the line from u_ref, with its own part of the turn.
                 let along = product(&step, &way) / product(&way, &way);
                 let sideways = core::array::from_fn(|i| step[i] - along * way[i]);
                 let tells = largest(&step) >= TELLING * 1.0_f64.max(largest(&u));
@@ -361,8 +364,8 @@ impl PeriodProblem<'_> {
             length = largest(&step);
             let turn = lambda * elementary::sqrt(row.hessian.iter().map(|h| product(h, h)).sum());
             let next = match kept {
-                // A step shows by how much the curvature along it is off. Sideways, where none has shown it, the curvature
-                // is off by that for each sample that has passed.
+                // A step shows the error of the curvature along it. Sideways, if no step has shown it, the curvature is off
+                // by that for each sample that has passed.
                 Some(curvature) => {
                     let off = lambda * off;
                     let sideways = match curvature.sideways {
@@ -372,8 +375,7 @@ impl PeriodProblem<'_> {
                     };
                     SECANT * (off + sideways) * length
                 }
-                // Methods of secants: a step is as the product of the two before it, where they have shown how the row
-                // curves.
+                // Secant methods: a step is about the product of the two before it, once they have shown how the row curves.
                 None if curved_sideways => {
                     SECANT * turn * length * before_length / elementary::sqrt(product(&back, &back))
                 }
@@ -387,7 +389,7 @@ impl PeriodProblem<'_> {
             if shortened > CONVERGING || rounds == CORRECTIONS {
                 return None;
             }
-            // The first two steps tell by how much the normal turns, where its turn was not known.
+            // The first two steps show how much the normal turns, if its turn was not known.
             ratio = if rounds == 2 && kept.is_none() { shortened } else { ratio };
         };
         // How far the row curves between u_ref and the answer, and how far its normal turns there, as parts of themselves.
@@ -398,8 +400,8 @@ impl PeriodProblem<'_> {
         let mut ratio = ratio.max(curvature).max(turn);
         // NaN fails this comparison.
         if !matches!(ratio, 0.0..=CONVERGING) {
-            // A quadratic that is curved inwards has one answer, however far it curves. What counts is what it misses; and
-            // that the plant does not turn all the way round, which no quadratic sees.
+            // A quadratic that is curved inwards has one answer, however far it curves. What counts is the row's difference
+            // from it, and that the plant does not turn all the way round, which no quadratic sees.
             let way = core::array::from_fn(|i| u[i] - u_ref[i]);
             let curvature = row.turn(&way);
             let missed = (at_reference.value + lambda * square - 0.5 * product(&way, &curvature)).abs();
@@ -444,7 +446,7 @@ impl PeriodProblem<'_> {
         }
         *out = u;
         qp.note_active(chosen, lambda);
-        // Where the look sideways showed nothing, as where a bound cut it short, the next sample looks again.
+        // If the look sideways showed nothing, for example because a bound cut it short, the next sample looks again.
         let looked =
             goes_on.map_or(if sees_sideways { 0 } else { GOES_ON }, |curvature| curvature.looked + 1);
         let passed =
@@ -458,7 +460,7 @@ impl PeriodProblem<'_> {
     }
 
     /// The row of the sample that u_ref violates by the largest distance, and the input nearest to u_ref that meets it;
-    /// `None` where there is none.
+    /// `None` if there is none.
     #[inline(always)]
     fn furthest<const M: usize>(&self, u_ref: &[f64; M]) -> Option<(usize, [f64; M])> {
         let (mut furthest, mut distance) = (None, 0.0);
@@ -532,8 +534,8 @@ mod tests {
         assert!((a[0] - b[0]).abs() < 1e-11 && (a[1] - b[1]).abs() < 1e-11, "{a:?}, {b:?}");
     }
 
-    /// From far outside the row turns several times as much as itself on the way, and there still is one answer. Curved
-    /// outwards there may be others.
+    /// From far outside, the row turns several times as much as itself on the way, and there still is one answer. If it is
+    /// curved outwards there may be others.
     #[test]
     fn the_nearest_point_of_a_row_that_is_curved_inwards() {
         for u_ref in [[3.0, 2.0], [-9.0, 4.0], [0.5, -30.0]] {

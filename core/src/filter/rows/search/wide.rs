@@ -1,23 +1,23 @@
-//! The wide search, for samples at which Newton's method from its two guesses ends at no settled answer.
+//! The wide search, for samples at which Newton's method finds no settled answer from its two guesses.
 //!
-//! A row is F(u) ≥ 0 with F smooth. It is hard where F turns with some inputs: a unicycle that stands across the line
-//! of sight gains by turning either way and then driving either way. Four parts find the nearest of these answers.
+//! A row is F(u) ≥ 0 with F smooth. It is hard if F turns with some inputs: a unicycle that stands across the line of sight
+//! gains by turning either way and then driving either way. Four parts find the nearest of these answers.
 //!
-//! **Scan.** Move one component of u over a grid around u_ref. For each of its values find another component for which
-//! all rows hold, by Newton's method along that axis. An acceleration enters all but affinely, so one or two steps are
-//! exact. The grid is first fine, then coarse, and at most as wide as the bounds: widths grow by a factor until they
-//! exceed the distance of an input that is known to meet the rows. Keep the local minima over the grid: of the distance
-//! where the rows hold, of the violation elsewhere.
+//! **Scan.** Move one component of u over a grid around u_ref. For each of its values find another component for which all
+//! rows hold, by Newton's method along that axis. An acceleration enters almost affinely, so one or two steps are exact. The
+//! grid is first fine, then coarse, and at most as wide as the bounds: widths grow by a factor until they exceed the
+//! distance of an input that is known to meet the rows. Keep the local minima over the grid: of the distance where the rows
+//! hold, of the violation elsewhere.
 //!
-//! **Restoration.** Go from there to the rows by the shortest way: the linearised QP with u in place of u_ref. Go
-//! back to a third of the way as long as the violation does not decrease.
+//! **Restoration.** Go from there to the rows by the shortest way: the linearised QP with u in place of u_ref. Go back to a
+//! third of the way as long as the violation does not decrease.
 //!
-//! **Polishing.** Go from an input that meets the rows towards the answer of the linearised QP. Restore each trial (the
-//! correction of second order), and take it where it is nearer to u_ref by a part of what the QP promises. So every
-//! iterate meets the rows, and the distance only falls.
+//! **Polishing.** Go from an input that meets the rows towards the answer of the linearised QP. Restore each trial
+//! (second-order correction), and accept it if it is nearer to u_ref by a part of what the QP promises. So every iterate
+//! meets the rows, and the distance only decreases.
 //!
-//! **Sharpening.** The distance is flat at its least, so polishing ends at about the root of the tolerance. If Newton's
-//! method does not converge from there, take steps of the secant method along the row.
+//! **Sharpening.** The distance is flat at its minimum, so polishing ends at about the root of the tolerance. If Newton's
+//! method does not converge from there, take secant steps along the row.
 //!
 //! All numbers of steps are fixed: the cost is bounded, and the same input gives the same bits.
 
@@ -25,34 +25,35 @@ use super::{Candidate, Linearised, MET, PeriodProblem};
 use crate::MAX_INPUTS;
 use crate::qp::{Outcome, Problem, RowSet, Solver, Workspace};
 
-/// Parts of the grid of one scan.
+/// Number of parts of the grid of one scan.
 const GRID: usize = 16;
 /// Half the width of the finest grid, in units of u.
 const FINEST: f64 = 1.0;
-/// Width of each grid over that of the one before.
+/// Width of each grid, in units of that of the one before.
 const WIDER: f64 = 8.0;
-/// Grids of one component, at most.
+/// Largest number of grids of one component.
 const WIDTHS: usize = 6;
-/// Steps of Newton's method along one axis.
+/// Number of steps of Newton's method along one axis.
 const ALONG: usize = 3;
-/// Starting points that are kept.
+/// Number of starting points that are kept.
 const STARTS: usize = 6;
-/// Steps of a restoration, and of one within a trial of the polishing.
+/// Numbers of steps of a restoration, and of one within a trial of the polishing.
 const RESTORING: [usize; 2] = [10, 4];
-/// Steps of a polishing.
+/// Number of steps of a polishing.
 const POLISHING: usize = 12;
-/// Steps of a sharpening.
+/// Number of steps of a sharpening.
 const SHARPENING: usize = 16;
-/// The part of the way of its first step, then the largest of any.
+/// The part of the way of the first step of a sharpening.
 const FIRST_PART: f64 = 0.3;
+/// The largest part of any of its steps.
 const LARGEST_PART: f64 = 10.0;
-/// Trials of one step.
+/// Number of trials of one step.
 const TRIALS: usize = 4;
 /// The part of what the linearised QP promises that must come true.
 const SUFFICIENT: f64 = 0.1;
-/// Starts are looked at up to this part of the distance of the answer that is known.
+/// Starts are considered up to this distance, in units of that of the known answer.
 const NEAR: f64 = 1.2;
-/// An answer takes the place of another where it is nearer by this part.
+/// An answer replaces another one if it is nearer by this part.
 const NEARER: f64 = 2e-3;
 
 type Input = [f64; MAX_INPUTS];
@@ -73,10 +74,10 @@ impl Start {
     }
 }
 
-/// The best starting points, the best first.
+/// The best starting points, in order, the best first.
 struct Starts {
     kept: [Start; STARTS],
-    /// Points further from u_ref are of no use.
+    /// Points further from u_ref are not useful.
     limit: f64,
 }
 
@@ -99,8 +100,8 @@ impl Starts {
 }
 
 impl PeriodProblem<'_> {
-    /// Looks for a better answer than `best`, which is `u`, that meets all rows but those of `relaxed`.
-    /// Where one is found it is written to `u`.
+    /// Looks for a better answer than `best`, which is `u`, that meets all rows but those of `relaxed`. If one is found, it
+    /// is written to `u`.
     pub(super) fn widen(
         &self,
         u: &mut [f64],
@@ -116,7 +117,7 @@ impl PeriodProblem<'_> {
             nearest.distance = best.distance;
         }
         let known = nearest.distance.is_finite();
-        // Start from the inputs at hand: the answer, u_ref, zero and both guesses.
+        // Start from the inputs available: the answer, u_ref, zero and both guesses.
         let mut starts = Starts::within(f64::INFINITY);
         let zero = [0.0; MAX_INPUTS];
         for guess in [Some(&*u), Some(self.u_ref), Some(&zero[..m])].iter().chain(guesses).flatten() {
@@ -132,7 +133,7 @@ impl PeriodProblem<'_> {
         if !known {
             found |= self.finish(&mut starts, &mut nearest, relaxed, at, qp);
         }
-        // Scan; once more from the first answer. Inputs near u_ref that all but meet the rows come after all that do.
+        // Scan, and once more from the first answer. Inputs near u_ref that almost meet the rows come after all that do.
         for _ in 0..2 {
             let limit = nearest.distance;
             let mut starts = Starts::within(NEAR * limit);
@@ -150,7 +151,7 @@ impl PeriodProblem<'_> {
             nearest.u[..m].copy_from_slice(u);
             nearest.distance = best.distance;
         }
-        // Make it exact: by Newton's method, or where that fails by sharpening.
+        // Make it exact: by Newton's method, or if that fails by sharpening.
         let mut exact = nearest.u;
         if let Some(found) = self.newton(&mut exact[..m], RowSet::ALL, at, qp)
             && found.is_met(relaxed)
@@ -174,8 +175,7 @@ impl PeriodProblem<'_> {
         })
     }
 
-    /// Restores and polishes the starts, and keeps an answer that is nearer than `nearest`. Returns whether there is
-    /// one.
+    /// Restores and polishes the starts, and keeps an answer that is nearer than `nearest`. Returns whether there is one.
     fn finish(
         &self,
         starts: &mut Starts,
@@ -234,8 +234,8 @@ impl PeriodProblem<'_> {
         }
     }
 
-    /// Moves the component `vary` from `low` to `high`, finds the component `solve` for each value, and keeps the
-    /// local minima.
+    /// Moves the component `vary` from `low` to `high`, finds the component `solve` for each value, and keeps the local
+    /// minima.
     fn scan(
         &self,
         (vary, solve): (usize, usize),
@@ -282,8 +282,8 @@ impl PeriodProblem<'_> {
         *start = best;
     }
 
-    /// The value of the component `axis` nearest to its reference for which the linearised rows hold; the middle of
-    /// their floors where they contradict.
+    /// The value of the component `axis` nearest to its reference for which the linearised rows hold; the middle of their
+    /// floors if they contradict each other.
     fn on_axis(&self, start: &Start, axis: usize, relaxed: RowSet, at: &Linearised) -> f64 {
         let m = self.u_ref.len();
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -342,8 +342,8 @@ impl PeriodProblem<'_> {
         }
     }
 
-    /// Moves from a start that meets the rows to the nearest answer that can be reached downhill, as long as that can
-    /// be nearer than `known`.
+    /// Moves from a start that meets the rows to the nearest answer that can be reached downhill, as long as that can be
+    /// nearer than `known`.
     fn polish(
         &self,
         start: &mut Start,
@@ -379,11 +379,11 @@ impl PeriodProblem<'_> {
         }
     }
 
-    /// Moves from a polished answer, known to about the root of the tolerance, to where the QP linearised there does
-    /// not move it any more.
+    /// Moves from a polished answer, known to about the root of the tolerance, to where the QP linearised there no longer
+    /// moves it.
     ///
-    /// Where the rows curve, full steps towards the QP's answer overshoot. With the last step Δu and the change ΔR of
-    /// the way that is left, the step −‖Δu‖²/(Δu·ΔR) of Barzilai and Borwein is the secant method along the row.
+    /// If the rows curve, full steps towards the QP's answer overshoot. With the last step Δu and the change ΔR of the
+    /// remaining way, the step −‖Δu‖²/(Δu·ΔR) of Barzilai and Borwein is the secant method along the row.
     fn sharpen(&self, start: &mut Start, relaxed: RowSet, at: &mut Linearised, qp: &mut Workspace) {
         let m = self.u_ref.len();
         let (mut point, mut least) = (*start, f64::INFINITY);
