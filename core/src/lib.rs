@@ -5,9 +5,7 @@
 //! `min ½‖u − u_ref‖²` under such rows and input bounds.
 //!
 //! ```
-//! use punctual_core::barriers::DistanceDisc;
-//! use punctual_core::filter::{BarrierSettings, Filter};
-//! use punctual_core::plants::PointMass;
+//! use punctual_core::{barriers::DistanceDisc, filter::*, plants::PointMass};
 //!
 //! // Reach the disc of radius 2 m around (45, 45) within 10 s.
 //! let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;

@@ -316,7 +316,7 @@ fn run<P>(
             tally.longest = tally.longest.max(micros);
             tally.sum += micros;
             let states = filter.state().barriers.clone();
-            let mut case = Case { rows: Vec::new(), t, x: x, period, bound, u_ref };
+            let mut case = Case { rows: Vec::new(), t, x, period, bound, u_ref };
             for ((promise, source), state) in promises.iter().zip(&states) {
                 let mut derivatives = Derivatives::ZERO;
                 source.evaluate(t, &x, &mut derivatives);
@@ -629,7 +629,7 @@ fn a_row_that_is_curved_inwards_is_solved_at_once() {
                 let demand =
                     promise.over_period(&state, t, &derivatives.drift[..2], PERIOD).expect("no approach");
                 let rows = vec![Asked { source: &**source, demand, floor: None }];
-                let case = Case { rows, t, x: x, period: PERIOD, bound: None, u_ref };
+                let case = Case { rows, t, x, period: PERIOD, bound: None, u_ref };
                 assert!(case.violation(u) <= 1e-8, "{seed} at {t}: {u:?}");
                 // A point of the oracle is as exact as its last step.
                 let (_, nearest) = case.oracle(1.05 * case.distance(u), 17).expect("at least that one");

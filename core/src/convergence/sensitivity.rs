@@ -69,7 +69,7 @@ impl BoundDerivative {
 impl FixedTime {
     /// The derivative along `dh` of the floors that [`Self::advance`] and, over `period`, [`Self::over_period`] give at time
     /// `t` (s), where `h` holds h⁽⁰⁾ … h⁽ⁿ⁻¹⁾. `state` has been moved to that sample; `anchors` says whether it was anchored
-    /// there, at `h` itself, with the deadline held constant. `errors` and `means` are those of [`Self::advance_by`]; the
+    /// there, at `h` itself, with the deadline held constant. `errors` and `means` are those of `Self::advance_by`; the
     /// errors are held constant, and the means move by `moves`.
     ///
     /// `None` if the condition does not know it: at the anchor of a custom profile that does not give its

@@ -242,7 +242,7 @@ impl Filter {
     /// The derivative is exact for the piece in force. The input is a piecewise smooth function: where the active rows, the
     /// active bounds, a phase or the better of two searches change, it has a kink or a jump. The derivative is that of the
     /// piece on which the sample was computed. A later deadline that was found at this sample
-    /// ([`Infeasible::Earliest`](Infeasible::Earliest)) is held constant. If more rows are active than the inputs can
+    /// ([`Infeasible::Earliest`]) is held constant. If more rows are active than the inputs can
     /// follow, the first ones count.
     ///
     /// Two parts are difference quotients. The change of the rate and of the margin chosen for a set that is kept

@@ -59,7 +59,7 @@ impl Filter {
 
     /// The residuals of `u`, the answer of the last [`Self::step`] or [`Self::peek`] to `u_ref`, in the optimality
     /// conditions of its QP. For a pointwise step they are small multiples of 1e-16. If the step looked over the period
-    /// ([`Report::predicted`]), they are those of the rows linearised at `u`, and as large as the 1e-9 at which the search
+    /// ([`Report::predicted`](super::Report::predicted)), they are those of the rows linearised at `u`, and as large as the 1e-9 at which the search
     /// stops. `None` if no QP was solved. Costs another solve: a check, not for every step.
     ///
     /// # Errors
@@ -86,7 +86,7 @@ impl Filter {
         self.rows.slots.iter().map(|slot| slot.name.as_str())
     }
 
-    /// Why barrier `index` has used another method than the configured one since its anchor ([`BarrierReport::fallback`]);
+    /// Why barrier `index` has used another method than the configured one since its anchor ([`BarrierReport::fallback`](super::BarrierReport::fallback));
     /// `None` if it has not. Recomputed at every call: not for every step.
     pub fn refusal(&self, index: usize) -> Option<Refusal> {
         self.rows.slots.get(index)?.promise.refusal(self.rows.state.barriers.get(index)?)

@@ -111,7 +111,7 @@ impl fmt::Display for Named<'_> {
                 let at = names.time(time);
                 write!(
                     f,
-                    "the plant is not where the model predicted; with the same deviation again, {name} would not be met at {at} s, by \
+                    "the plant is not where the model predicted; with 1.5 times that deviation again, {name} would not be met at {at} s, by \
                      {missing}"
                 )
             }

@@ -10,7 +10,7 @@
 //! |---|---|
 //! | `model` | the plant run ahead, its linearisation by differences, the equilibrium near a state |
 //! | `law` | feedback that stops the plant, and feedback that follows a reference |
-//! | `backup_plan`, `failure` | a verified list of inputs; why there is none |
+//! | `backup_plan` | a verified list of held inputs |
 //! | `check` | the exact check: a rollout that meets every requirement, between its nodes too |
 //! | `expansion` | polynomials in time, and their lower bounds |
 //! | `failure` | messages that say why there is no plan |

@@ -1,10 +1,9 @@
 //! A filter: it samples its inputs and remembers its promises.
 
 use punctual_core::filter::{
-    AssuranceStatus, BarrierReport, Filter, FilterState, NoDerivative, SampleDerivative, Status,
+    Assurance, AssuranceStatus, BarrierReport, Filter, FilterState, NoDerivative, SampleDerivative, Status,
 };
 use punctual_core::lie::Direction;
-use punctual_core::plan::Failure;
 
 use super::{Block, BlockState, Values, in_words};
 use crate::configuration::{ConfigurationError, FilterConfiguration, Parameter, UNBOUNDED, updated};
@@ -79,12 +78,10 @@ impl FilterBlock {
 
     /// Status of the guarantee, where plans are followed. They are not where a parameter that was set since asks for what
     /// none accounts for.
-    fn assurance_status(&self) -> Option<(AssuranceStatus, Option<Failure>)> {
-        let refused = (AssuranceStatus::Refused, None);
-        let assurance = self.filter.assurance();
-        self.configuration
-            .is_assured()
-            .then(|| assurance.map_or(refused, |assurance| (assurance.status, assurance.failure)))
+    fn assurance_status(&self) -> Option<AssuranceStatus> {
+        let of = |assurance: &Assurance| assurance.status;
+        let status = self.filter.assurance().map_or(AssuranceStatus::Refused, of);
+        self.configuration.is_assured().then_some(status)
     }
 
     /// The number of the output after those of the barriers.
@@ -100,9 +97,9 @@ impl FilterBlock {
     }
 
     /// Writes the status of the guarantee, why u_ref was changed, and at `t` until when the guarantee holds.
-    fn write_assurance_status(&self, assurance_status: AssuranceStatus, t: f64, values: &mut Values) {
+    fn write_assurance_status(&self, status: AssuranceStatus, t: f64, values: &mut Values) {
         let at = self.after_barriers();
-        values.integers[at] = assurance_status as i32;
+        values.integers[at] = status as i32;
         values.integers[at + 1] = self
             .filter
             .assurance()
@@ -142,8 +139,8 @@ impl FilterBlock {
         let at = self.layout.outputs + self.layout.inputs;
         values.integers[at] = report.status as i32;
         write_barriers(&report.barriers, at + 1, values);
-        if let Some((assurance_status, _)) = self.assurance_status() {
-            self.write_assurance_status(assurance_status, t, values);
+        if let Some(status) = self.assurance_status() {
+            self.write_assurance_status(status, t, values);
         }
         if self.filter.integrated_input().is_some() {
             values.reals[self.integral()] = integrated;
@@ -237,27 +234,25 @@ impl Block for FilterBlock {
     }
 
     fn notice(&mut self) -> Option<String> {
-        let (assurance_status, failure) = self.assurance_status()?;
-        let stands = |assurance_status| {
-            matches!(assurance_status, AssuranceStatus::Undecided | AssuranceStatus::Assured)
-        };
-        let before = self.noticed.replace(assurance_status);
-        if before == Some(assurance_status) {
+        let status = self.assurance_status()?;
+        let holds = |status| matches!(status, AssuranceStatus::Undecided | AssuranceStatus::Assured);
+        let before = self.noticed.replace(status);
+        if before == Some(status) {
             return None;
         }
-        if assurance_status == AssuranceStatus::Assured && before.is_some_and(|before| !stands(before)) {
+        if status == AssuranceStatus::Assured && before.is_some_and(|before| !holds(before)) {
             return Some("the guarantee is regained: a plan keeps the promise from here".to_owned());
         }
-        (!stands(assurance_status)).then(|| {
-            let why = match failure {
-                Some(failure) if assurance_status == AssuranceStatus::Refused => {
+        (!holds(status)).then(|| {
+            let why = match self.filter.assurance().and_then(|assurance| assurance.failure) {
+                Some(failure) if status == AssuranceStatus::Refused => {
                     Some(self.configuration.refusal(failure))
                 }
                 Some(failure) => Some(self.configuration.failure(failure)),
                 None => self.configuration.unaccounted(),
             };
             let why = why.map(|why| format!(": {why}")).unwrap_or_default();
-            format!("the guarantee is {} ({}){why}", assurance_status.name(), assurance_status.meaning())
+            format!("the guarantee is {} ({}){why}", status.name(), status.meaning())
         })
     }
 
@@ -323,9 +318,8 @@ impl Block for FilterBlock {
             }
             at += BARRIER_OUTPUTS.len();
         }
-        if let Some((assurance_status, _)) = self.assurance_status() {
-            let shown =
-                if self.filter.assurance().is_some() { AssuranceStatus::Undecided } else { assurance_status };
+        if let Some(status) = self.assurance_status() {
+            let shown = if self.filter.assurance().is_some() { AssuranceStatus::Undecided } else { status };
             self.write_assurance_status(shown, 0.0, values);
         }
         self.write_codes(values);

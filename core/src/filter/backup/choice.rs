@@ -216,7 +216,7 @@ impl Planning<'_> {
             return Ok(chosen);
         }
         match planner.tail(plan, t, x) {
-            Ok(kept) => Ok(choice.from_plan(kept, memory)),
+            Ok(kept) => Ok(choice.beside_plan(kept, memory)),
             // The plant is off the plan: anything else that keeps the promise is used.
             Err(failure) => choice.any_other().ok_or(failure),
         }
@@ -356,7 +356,7 @@ impl Choice<'_, '_> {
 
     /// From the plan's own input, that of `kept`, towards u_ref or the rows: at first as near to these as possible, then
     /// about as near as at the last sample.
-    fn from_plan(&self, kept: BackupPlan, memory: &mut ChoiceMemory) -> Chosen {
+    fn beside_plan(&self, kept: BackupPlan, memory: &mut ChoiceMemory) -> Chosen {
         let to_rows = self.wish.reached || !self.is_wish;
         let (own, far) = (kept.inputs[0].1, if to_rows { self.wish.rows } else { self.wish.wanted });
         let mixed = |share: f64, backup_plan, plan| {
