@@ -179,6 +179,35 @@ fn what_is_promised_is_kept_whatever_is_wanted() {
     assert!(plans > 0, "the plan never had to drive: the cases are too easy");
 }
 
+/// A hold that was made known before plans were asked for is theirs; plans are given once, and after an integrator.
+#[test]
+fn plans_take_what_the_filter_knows() {
+    let input = |hold_first: bool| {
+        let mut filter = Vehicle::Unicycle.filter(8.0, [6.0, 2.0]);
+        if hold_first {
+            filter.expect_hold(Some(0.5 * PERIOD)).expect("a hold");
+        }
+        let mut filter = filter.with_plans(PERIOD).expect("plans");
+        if !hold_first {
+            filter.expect_hold(Some(0.5 * PERIOD)).expect("a hold");
+        }
+        let mut u = [0.0; 2];
+        let report = filter.step(0.0, &[0.0, 0.0, -0.4, 1.0], &[6.0, 1.0], &mut u).expect("right dimensions");
+        assert!(report.is_assured());
+        (u.map(f64::to_bits), filter.last_hold())
+    };
+    assert_eq!(input(true), input(false));
+    assert_eq!(input(true).1, Some(0.5 * PERIOD));
+    let planned = || Vehicle::Unicycle.assured(8.0, [6.0, 2.0]);
+    let twice = planned().with_plans(PERIOD).err().map(|e| e.to_string());
+    assert_eq!(twice.as_deref(), Some("plans: are there already, must be given once"));
+    let beta = Integration { state: 3, input: 0, limits: [-1.0, 1.0], gain: 1.0 };
+    let late = planned().with_integrator(beta).err().map(|e| e.to_string());
+    assert_eq!(late.as_deref(), Some("integrator: comes after the plans, must come before them"));
+    let replaced = planned().set_deadline(0, 3.0).err().map(|e| e.to_string());
+    assert!(replaced.is_some_and(|e| e.starts_with("deadline: cannot be replaced where plans are followed")));
+}
+
 #[test]
 fn what_no_input_can_keep_is_refused() {
     // From rest 12 m/s² lead 17.3 m far along x in 1.7 s, and the goal begins at 18 m.

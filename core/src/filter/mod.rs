@@ -99,6 +99,8 @@ impl Filter {
         let integrator = Integrator::new(&self.rows, of)?;
         self.rows.state.integrated = integrator.limited(0.0);
         self.integrator = Some(integrator);
+        // A hold that was known before is that of the integral.
+        self.expected = self.rows.expected.take();
         Ok(self)
     }
 

@@ -185,6 +185,8 @@ impl Filter {
             [bounds.min[own.of.input], bounds.max[own.of.input]] = own.rates;
         }
         self.backup = Some(Box::new(Backup::new(plans, bounds)));
+        // A hold that was known before is that of the plans.
+        self.expected = self.expected.or(self.rows.expected.take());
         Ok(self)
     }
 
