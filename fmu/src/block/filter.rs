@@ -301,10 +301,10 @@ impl Block for FilterBlock {
             let name = self.configuration.plant.input_name(i);
             let [min, max] = self.configuration.bounds.get(name).copied().unwrap_or_default();
             // Not `clamp`, which panics where the bounds contradict each other.
-            values.reals[outputs + i] = match self.filter.integrated_input() {
-                Some(input) if input == i => self.filter.integrated(),
-                _ => 0.0_f64.max(min).min(max),
-            };
+            values.reals[outputs + i] = 0.0_f64.max(min).min(max);
+        }
+        if let Some(input) = self.filter.integrated_input() {
+            values.reals[outputs + input] = self.filter.integrated();
         }
         let mut at = outputs + inputs;
         values.integers[at] = Status::InvalidInput as i32;
