@@ -1,6 +1,8 @@
 //! Repeats one piece of work a given number of times, for benches/instructions.sh to count:
 //! `instructions CASE TIMES`. Without arguments: every case once.
 
+use std::sync::Arc;
+
 use std::hint::black_box;
 
 use punctual_core::dynamics::ControlAffine;
@@ -79,7 +81,12 @@ fn bicycle() -> Bicycle {
     Bicycle::new(10.0).expect("valid bicycle")
 }
 
-fn held<P: ControlAffine<4, 2> + Copy + Send + 'static>(plant: P, obstacles: usize, period: f64, times: u32) {
+fn held<P: ControlAffine<4, 2> + Copy + Send + Sync + 'static>(
+    plant: P,
+    obstacles: usize,
+    period: f64,
+    times: u32,
+) {
     let builder = obstructed(plant, obstacles).sampling(Sampling::default()).expect("valid settings");
     let mut drive = Drive::recorded(builder, &plant, period);
     for _ in 0..times {
@@ -154,7 +161,7 @@ fn qp(references: [[f64; 2]; 2], times: u32) {
 
 fn jets<const NX: usize>(n: usize, times: u32) {
     let source: Box<dyn DerivativeSource> =
-        lie::along(Integrators::<NX>, disc(), n).expect("a relative degree in range");
+        lie::along(Arc::new(Integrators::<NX>), disc(), n).expect("a relative degree in range");
     let (x, mut out) = (Integrators::<NX>::state(), Derivatives::ZERO);
     for _ in 0..times {
         source.evaluate(black_box(T), black_box(&x), &mut out);

@@ -41,7 +41,7 @@ fn median(mut values: Vec<f64>) -> f64 {
 /// Prints the figures; returns those that are too large.
 fn compare<P>(model: usize, plant: P) -> Vec<String>
 where
-    P: ControlAffine<4, 2> + Copy + Send + 'static,
+    P: ControlAffine<4, 2> + Copy + Send + Sync + 'static,
 {
     let name = MODELS[model].0;
     let mut missed = Vec::new();

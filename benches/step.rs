@@ -7,13 +7,15 @@
 
 #![allow(missing_docs, reason = "criterion_group! makes an undocumented function")]
 
+use std::sync::Arc;
+
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use punctual_core::filter::{BarrierSettings, FilterBuilder, Sampling, Status};
 use punctual_core::lie::{self, Derivatives};
 use punctual_core::plants::{Bicycle, PointMass, Unicycle};
-use support::{ByHand, Integrators, SAFE, T, X, anchored, disc, goal, goal_and_obstacles, promise};
+use support::{ByHand, Integrators, SAFE, T, X, anchored, disc, goal, goal_and_obstacles, headed, promise};
 
 mod support;
 
@@ -55,8 +57,8 @@ fn steps(c: &mut Criterion) {
     filtered("step/bicycle", goal(bicycle()));
     let bounded = goal(bicycle()).bounds(&[-60.0, -20.0], &[60.0, 20.0]).expect("valid bounds");
     filtered("step/bicycle, bounded", bounded);
-    let two = goal(bicycle()).barrier("again", bicycle(), disc(), BarrierSettings::within(9.0));
-    filtered("step/bicycle, two barriers", two.expect("valid settings"));
+    let two = headed(bicycle()).barrier("again", disc(), BarrierSettings::within(9.0));
+    filtered("step/bicycle, two barriers", two.expect("valid settings").erased());
     filtered("step/10 obstacles", goal_and_obstacles(10));
     filtered("step/60 obstacles", goal_and_obstacles(60));
     let boxed = |builder: FilterBuilder| builder.bounds(&[-200.0; 2], &[200.0; 2]).expect("valid bounds");
@@ -73,12 +75,24 @@ fn steps(c: &mut Criterion) {
 
 fn jets(c: &mut Criterion) {
     let cases = [
-        ("jets/point mass", lie::along(PointMass, disc(), 2), &X[..]),
-        ("jets/unicycle", lie::along(Unicycle, disc(), 2), &X),
-        ("jets/bicycle", lie::along(bicycle(), disc(), 2), &X),
-        ("jets/integrators, order 2", lie::along(Integrators::<4>, disc(), 2), &Integrators::<4>::state()),
-        ("jets/integrators, order 4", lie::along(Integrators::<8>, disc(), 4), &Integrators::<8>::state()),
-        ("jets/integrators, order 8", lie::along(Integrators::<16>, disc(), 8), &Integrators::<16>::state()),
+        ("jets/point mass", lie::along(Arc::new(PointMass), disc(), 2), &X[..]),
+        ("jets/unicycle", lie::along(Arc::new(Unicycle), disc(), 2), &X),
+        ("jets/bicycle", lie::along(Arc::new(bicycle()), disc(), 2), &X),
+        (
+            "jets/integrators, order 2",
+            lie::along(Arc::new(Integrators::<4>), disc(), 2),
+            &Integrators::<4>::state(),
+        ),
+        (
+            "jets/integrators, order 4",
+            lie::along(Arc::new(Integrators::<8>), disc(), 4),
+            &Integrators::<8>::state(),
+        ),
+        (
+            "jets/integrators, order 8",
+            lie::along(Arc::new(Integrators::<16>), disc(), 8),
+            &Integrators::<16>::state(),
+        ),
     ];
     for (name, source, x) in cases {
         let source = source.expect("a relative degree in range");

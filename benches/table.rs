@@ -81,7 +81,7 @@ where
 
 fn vehicle<P>(name: &str, plant: P, bounds: [f64; 2])
 where
-    P: ControlAffine<4, 2> + Copy + Send + 'static,
+    P: ControlAffine<4, 2> + Copy + Send + Sync + 'static,
 {
     for obstacles in OBSTACLES {
         line(

@@ -34,7 +34,7 @@ fn run(
     nominal: fn(&[f64; 4]) -> [f64; 2],
 ) -> Result<Run, punctual_core::Error> {
     let mut filter =
-        Filter::builder(4, 2).barrier("goal", Unicycle, barrier, settings)?.sampling(sampling)?.build()?;
+        Filter::builder(Unicycle).barrier("goal", barrier, settings)?.sampling(sampling)?.build()?;
     let schedule = Schedule { step: STEP, steps: (2.0 * DEADLINE / STEP).round() as usize, substeps: 1 };
     let mut run = Run { arrival: f64::INFINITY, outside: 0.0, peak: [0.0; 2] };
     closed_loop(

@@ -5,6 +5,8 @@
 //! Run with `cargo run --example flexible_joint`.
 #![expect(clippy::print_stdout, reason = "an example shows its result")]
 
+use std::sync::Arc;
+
 use punctual_core::barrier::Barrier;
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{BarrierSettings, Filter};
@@ -55,9 +57,9 @@ fn main() -> Result<(), punctual_core::Error> {
     // for it.
     let found = lie::detected(&ARM, &window);
     assert_eq!(found, lie::RelativeDegree::Uniform(4));
-    let source = lie::along(ARM, window, 4)?;
+    let source = lie::along(Arc::new(ARM), window, 4)?;
     let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(DEADLINE) };
-    let mut filter = Filter::builder(4, 1).source("window", source, settings)?.build()?;
+    let mut filter = Filter::from_sources(4, 1).source("window", source, settings)?.build()?;
 
     // 6 s in steps of 1 ms, hanging at rest. The wanted input damps the motor and does nothing else, so that
     // gravity pulls the arm down all the time.

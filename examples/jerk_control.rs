@@ -39,8 +39,7 @@ impl Barrier<3> for Above {
 fn main() -> Result<(), punctual_core::Error> {
     const DEADLINE: f64 = 10.0; // s
     let settings = BarrierSettings { margin: 0.01, ..BarrierSettings::within(DEADLINE) };
-    let mut filter =
-        Filter::builder(3, 1).barrier("level", Lift, Above { level: 20.0 }, settings)?.build()?;
+    let mut filter = Filter::builder(Lift).barrier("level", Above { level: 20.0 }, settings)?.build()?;
     assert_eq!(filter.relative_degrees().collect::<Vec<_>>(), [3], "found, not declared");
 
     // 20 s in steps of 1 ms, from rest at 0. The wanted motion is down at 1 m/s.

@@ -42,8 +42,7 @@ fn main() -> Result<(), punctual_core::Error> {
     const DEADLINE: f64 = 5.0; // s
     let cart = || Cart { drag: 0.05 };
     let settings = BarrierSettings { margin: 0.05, ..BarrierSettings::within(DEADLINE) };
-    let mut filter =
-        Filter::builder(2, 1).barrier("line", cart(), Beyond { line: 20.0 }, settings)?.build()?;
+    let mut filter = Filter::builder(cart()).barrier("line", Beyond { line: 20.0 }, settings)?.build()?;
 
     // 10 s in steps of 10 ms from rest at 0; the driver wants to go at -1 m/s.
     let schedule = Schedule { step: 0.01, steps: 1000, substeps: 1 };

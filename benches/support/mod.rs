@@ -31,10 +31,18 @@ pub(crate) fn disc() -> DistanceDisc {
 /// One goal, reached within [`DEADLINE`]; the constraint at the samples only.
 pub(crate) fn goal<P>(plant: P) -> FilterBuilder
 where
-    P: ControlAffine<4, 2> + Send + 'static,
+    P: ControlAffine<4, 2> + Send + Sync + 'static,
 {
-    Filter::builder(4, 2)
-        .barrier("goal", plant, disc(), BarrierSettings::within(DEADLINE))
+    headed(plant).erased()
+}
+
+/// [`goal`], to which barriers can be added.
+pub(crate) fn headed<P>(plant: P) -> FilterBuilder<P, 4, 2>
+where
+    P: ControlAffine<4, 2> + Send + Sync + 'static,
+{
+    Filter::builder(plant)
+        .barrier("goal", disc(), BarrierSettings::within(DEADLINE))
         .and_then(|b| b.sampling(Sampling::Pointwise))
         .expect("valid settings")
 }
@@ -47,16 +55,17 @@ pub(crate) fn goal_and_obstacles(obstacles: usize) -> FilterBuilder {
 /// The goal of `plant` and `obstacles` discs beside its way.
 pub(crate) fn obstructed<P>(plant: P, obstacles: usize) -> FilterBuilder
 where
-    P: ControlAffine<4, 2> + Copy + Send + 'static,
+    P: ControlAffine<4, 2> + Copy + Send + Sync + 'static,
 {
-    (0..obstacles).fold(goal(plant), |builder, i| {
+    let all = (0..obstacles).fold(headed(plant), |builder, i| {
         let (column, line) = ((i % 10) as f64, (i / 10) as f64);
         let disc = DistanceDisc::new([-20.0 + 8.0 * column, 60.0 + 8.0 * line], RADIUS, SMOOTHING);
         let obstacle = Outside(disc.expect("valid disc"));
         builder
-            .barrier(&format!("obstacle {i}"), plant, obstacle, BarrierSettings::within(DEADLINE))
+            .barrier(&format!("obstacle {i}"), obstacle, BarrierSettings::within(DEADLINE))
             .expect("valid settings")
-    })
+    });
+    all.erased()
 }
 
 /// The filter, anchored at rest at the origin at time 0.

@@ -20,7 +20,7 @@ pub(crate) const MODELS: [(&str, [&str; 4]); 3] = [
 ];
 
 fn filter(states: usize, source: Box<dyn DerivativeSource>) -> FilterBuilder {
-    Filter::builder(states, 2)
+    Filter::from_sources(states, 2)
         .source("goal", source, BarrierSettings::within(DEADLINE))
         .and_then(|b| b.sampling(Sampling::Pointwise))
         .expect("valid settings")

@@ -41,15 +41,6 @@ pub trait ControlAffine<const NX: usize, const NU: usize> {
     /// step does not look for it. With the default, `false`, it does, for a gust say.
     const SLOW_CURVATURE: bool = false;
 
-    /// Whether `other` has the same f and g. Barriers along the same plant share what depends on it alone. The default knows
-    /// only of plants without data that they are.
-    fn is_same(&self, _other: &Self) -> bool
-    where
-        Self: Sized,
-    {
-        size_of::<Self>() == 0
-    }
-
     /// f(x): the rate of change of the state at u = 0, per second.
     fn drift<S: Scalar>(&self, x: &[S; NX]) -> [S; NX];
 
@@ -185,10 +176,6 @@ impl<P, const NX: usize, const EXTENDED: usize, const NU: usize> ControlAffine<E
 where
     P: ControlAffine<NX, NU>,
 {
-    fn is_same(&self, other: &Self) -> bool {
-        self.input == other.input && self.plant.is_same(&other.plant)
-    }
-
     #[inline]
     fn drift<S: Scalar>(&self, x: &[S; EXTENDED]) -> [S; EXTENDED] {
         const { assert!(EXTENDED == NX + 1, "one state more than the plant inside") };
@@ -244,8 +231,8 @@ where
 ///
 /// // State (x_p, y_p, θ, v, p_x, p_y, v_x, v_y).
 /// let clear = Outside(DistanceDisc::new([0.0, 0.0], 2.0, 2.0)?.following(4));
-/// let filter = Filter::builder(8, 2)
-///     .barrier::<_, _, 8, 2>("clear", WithPoint::<_, 4>(Unicycle), clear, BarrierSettings::within(5.0))?
+/// let filter = Filter::builder::<_, 8, 2>(WithPoint::<_, 4>(Unicycle))
+///     .barrier("clear", clear, BarrierSettings::within(5.0))?
 ///     .build()?;
 /// # Ok::<(), punctual_core::Error>(())
 /// ```
@@ -260,10 +247,6 @@ where
     /// The point moves by itself, so no input reaches it: to the plant it is what time is.
     const LARGEST_DEGREE: usize = P::LARGEST_DEGREE;
     const SLOW_CURVATURE: bool = P::SLOW_CURVATURE;
-
-    fn is_same(&self, other: &Self) -> bool {
-        self.0.is_same(&other.0)
-    }
 
     fn drift<S: Scalar>(&self, x: &[S; EXTENDED]) -> [S; EXTENDED] {
         const { assert!(EXTENDED == NX + 4, "four states more than the plant inside") };

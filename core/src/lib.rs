@@ -9,8 +9,8 @@
 //!
 //! // Reach the disc of radius 2 m around (45, 45) within 10 s.
 //! let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
-//! let mut filter = Filter::builder(4, 2)
-//!     .barrier("goal", PointMass, goal, BarrierSettings::within(10.0))?
+//! let mut filter = Filter::builder(PointMass)
+//!     .barrier("goal", goal, BarrierSettings::within(10.0))?
 //!     .build()?;
 //! let mut u = [0.0; 2];
 //! let report = filter.step(0.0, &[0.0; 4], &[0.0; 2], &mut u)?;

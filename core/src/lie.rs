@@ -26,6 +26,7 @@ use ahead::SUBSTEPS;
 pub use ahead::{Ahead, flow};
 
 use alloc::boxed::Box;
+use alloc::sync::Arc;
 use core::any::Any;
 use core::array::from_fn;
 use core::marker::PhantomData;
@@ -44,7 +45,7 @@ pub use embedded::embedded;
 pub use external::external;
 pub(crate) use source::FEW_ORDERS;
 pub use source::{
-    DerivativeSource, Direction, Directional, EXPANSION_ORDERS, Expansion, ExpansionOver, Predict,
+    DerivativeSource, Direction, Directional, EXPANSION_ORDERS, Expansion, ExpansionOver, PlantId, Predict,
     PredictDirectional, RateOver, SharedPlant,
 };
 
@@ -131,7 +132,7 @@ impl Derivatives {
 
 /// A barrier along a plant, with `K` = n + 1 Taylor coefficients, and `N` = n for a row over the period.
 struct Along<P, B, const NX: usize, const NU: usize, const K: usize, const N: usize> {
-    plant: P,
+    plant: Arc<P>,
     barrier: B,
     dims: PhantomData<([(); NX], [(); NU])>,
 }
@@ -163,7 +164,7 @@ where
 impl<P, B, const NX: usize, const NU: usize, const K: usize, const N: usize> DerivativeSource
     for Along<P, B, NX, NU, K, N>
 where
-    P: ControlAffine<NX, NU> + Send + 'static,
+    P: ControlAffine<NX, NU> + Send + Sync + 'static,
     B: Barrier<NX> + Send,
 {
     fn relative_degree(&self) -> usize {
@@ -179,7 +180,7 @@ where
     }
 
     fn evaluate(&self, t: f64, x: &[f64], out: &mut Derivatives) {
-        Self::write(&barrier_series(&self.plant, &self.barrier, t, &first(x)), out);
+        Self::write(&barrier_series(&*self.plant, &self.barrier, t, &first(x)), out);
     }
 
     fn predict(&self) -> Option<&dyn Predict> {
@@ -212,17 +213,17 @@ where
 {
     fn flow(&self, x: &mut [f64], u: &[f64], duration: f64) {
         let (from, held) = (first::<f64, NX>(x), first(u));
-        x.copy_from_slice(&flow(&self.plant, &from, &held, duration, SUBSTEPS));
+        x.copy_from_slice(&flow(&*self.plant, &from, &held, duration, SUBSTEPS));
     }
 
     fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
         *out = Ahead::ZERO;
-        let motion = ahead::motion::<P, NX, NU, K>(&self.plant, x, u, duration);
+        let motion = ahead::motion::<P, NX, NU, K>(&*self.plant, x, u, duration);
         ahead::evaluate(&self.barrier, t + duration, &motion, out);
     }
 
     fn ahead_of_row(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
-        let motion = ahead::motion::<P, NX, NU, N>(&self.plant, x, u, duration);
+        let motion = ahead::motion::<P, NX, NU, N>(&*self.plant, x, u, duration);
         ahead::evaluate(&self.barrier, t + duration, &motion, out);
     }
 
@@ -234,7 +235,7 @@ where
         duration: f64,
         out: &mut [f64; MAX_RELATIVE_DEGREE + 1],
     ) {
-        ahead::values::<P, B, NX, NU, K>((&self.plant, &self.barrier), (t, duration), x, u, out);
+        ahead::values::<P, B, NX, NU, K>((&*self.plant, &self.barrier), (t, duration), x, u, out);
     }
 
     fn values_of_row(
@@ -245,7 +246,7 @@ where
         duration: f64,
         out: &mut [f64; MAX_RELATIVE_DEGREE + 1],
     ) {
-        ahead::values::<P, B, NX, NU, N>((&self.plant, &self.barrier), (t, duration), x, u, out);
+        ahead::values::<P, B, NX, NU, N>((&*self.plant, &self.barrier), (t, duration), x, u, out);
     }
 
     fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]) {
@@ -255,7 +256,7 @@ where
 
     fn path(&self, x: &[f64], u: &[f64], out: &mut [Expansion]) {
         let x = first::<f64, NX>(x);
-        ahead::path::<P, NX, NU>(&self.plant, &x, u, out);
+        ahead::path::<P, NX, NU>(&*self.plant, &x, u, out);
     }
 
     fn value(&self, t: f64, x: &[f64]) -> f64 {
@@ -268,9 +269,9 @@ where
 
     fn rates_over(&self, path: &[ExpansionOver], u: &[f64], orders: usize, out: &mut [RateOver]) -> bool {
         if orders <= FEW_ORDERS {
-            ahead::rates_over::<P, NX, NU, FEW_ORDERS>(&self.plant, path, u, out);
+            ahead::rates_over::<P, NX, NU, FEW_ORDERS>(&*self.plant, path, u, out);
         } else {
-            ahead::rates_over::<P, NX, NU, { EXPANSION_ORDERS - 1 }>(&self.plant, path, u, out);
+            ahead::rates_over::<P, NX, NU, { EXPANSION_ORDERS - 1 }>(&*self.plant, path, u, out);
         }
         true
     }
@@ -288,7 +289,7 @@ where
         if B::ONE_SIDED_CURVATURE && P::SLOW_CURVATURE && K > 2 {
             return None;
         }
-        let model = (&self.plant, &self.barrier);
+        let model = (&*self.plant, &self.barrier);
         Some(ahead::lowest_held::<P, B, NX, NU>(model, (t, duration), x, u, wanted))
     }
 
@@ -309,12 +310,8 @@ where
     P: ControlAffine<NX, NU> + 'static,
     B: Barrier<NX>,
 {
-    fn plant(&self) -> &dyn Any {
-        &self.plant
-    }
-
-    fn shares(&self, plant: &dyn Any) -> bool {
-        plant.downcast_ref().is_some_and(|plant| self.plant.is_same(plant))
+    fn plant(&self) -> PlantId {
+        PlantId::of(&self.plant, [NX, NU])
     }
 
     fn rooms(&self) -> [Box<dyn Any + Send>; 2] {
@@ -324,7 +321,7 @@ where
     }
 
     fn motion(&self, x: &[f64], room: &mut dyn Any) {
-        *room.downcast_mut().expect(ROOM) = motion::<P, NX, NU, K>(&self.plant, &first(x));
+        *room.downcast_mut().expect(ROOM) = motion::<P, NX, NU, K>(&*self.plant, &first(x));
     }
 
     fn evaluate_along(&self, t: f64, motion: &dyn Any, out: &mut Derivatives) {
@@ -333,7 +330,7 @@ where
     }
 
     fn motion_ahead(&self, x: &[f64], u: &[f64], duration: f64, room: &mut dyn Any) {
-        *room.downcast_mut().expect(ROOM) = ahead::motion::<P, NX, NU, N>(&self.plant, x, u, duration);
+        *room.downcast_mut().expect(ROOM) = ahead::motion::<P, NX, NU, N>(&*self.plant, x, u, duration);
     }
 
     fn ahead_of_row_along(&self, t: f64, motion: &dyn Any, out: &mut Ahead) {
@@ -363,7 +360,7 @@ where
     B: Barrier<NX>,
 {
     fn flow_directional(&self, x: &mut [f64], dx: &mut [f64], u: &[f64], duration: f64) {
-        ahead::flow_directional::<P, NX, NU>(&self.plant, x, dx, u, duration);
+        ahead::flow_directional::<P, NX, NU>(&*self.plant, x, dx, u, duration);
     }
 
     fn ahead_directional(
@@ -375,7 +372,7 @@ where
         duration: f64,
         out: &mut Ahead,
     ) {
-        let model = (&self.plant, &self.barrier);
+        let model = (&*self.plant, &self.barrier);
         ahead::differentiate::<P, B, NX, NU, K>(model, (t, duration), x, u, direction, out);
     }
 }
@@ -384,18 +381,20 @@ where
 /// [`LARGEST_DEGREE`](ControlAffine::LARGEST_DEGREE). The number of states is always such a limit, since the gradients of h,
 /// …, h⁽ⁿ⁻¹⁾ are linearly independent (A. Isidori, *Nonlinear Control Systems*, lemma 4.1.1).
 ///
+/// Several barriers of a filter share work, and a plan, if each gets a clone of one `Arc` of the plant.
+///
 /// # Errors
 ///
 /// `n` outside 1 ..= min(`LARGEST_DEGREE`, [`MAX_RELATIVE_DEGREE`]); `NU` above [`MAX_INPUTS`] or zero. Whether `n` *is* the
 /// relative degree is for [`detected`] to decide. It is also checked at every evaluation
 /// ([`Derivatives::lower_sensitivity`]).
 pub fn along<P, B, const NX: usize, const NU: usize>(
-    plant: P,
+    plant: Arc<P>,
     barrier: B,
     n: usize,
 ) -> Result<Box<dyn DerivativeSource>, Error>
 where
-    P: ControlAffine<NX, NU> + Send + 'static,
+    P: ControlAffine<NX, NU> + Send + Sync + 'static,
     B: Barrier<NX> + Send + 'static,
 {
     checked_inputs(NU)?;

@@ -168,10 +168,6 @@ impl ControlAffine<4, 2> for Bicycle {
     const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
     const SLOW_CURVATURE: bool = true;
 
-    fn is_same(&self, other: &Self) -> bool {
-        self == other
-    }
-
     #[inline]
     fn drift<S: Scalar>(&self, x: &[S; 4]) -> [S; 4] {
         Unicycle.drift(x)
@@ -224,10 +220,6 @@ impl ControlAffine<4, 2> for SmallSlipBicycle {
     const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
     const SLOW_CURVATURE: bool = true;
 
-    fn is_same(&self, other: &Self) -> bool {
-        self == other
-    }
-
     #[inline]
     fn drift<S: Scalar>(&self, x: &[S; 4]) -> [S; 4] {
         Unicycle.drift(x)
@@ -264,10 +256,6 @@ impl Signals for SmallSlipBicycleWithRate {
 impl ControlAffine<5, 2> for SmallSlipBicycleWithRate {
     const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
     const SLOW_CURVATURE: bool = true;
-
-    fn is_same(&self, other: &Self) -> bool {
-        ControlAffine::<5, 2>::is_same(&self.0, &other.0)
-    }
 
     #[inline]
     fn drift<S: Scalar>(&self, x: &[S; 5]) -> [S; 5] {
@@ -338,10 +326,6 @@ impl Signals for KinematicBicycle {
 impl ControlAffine<5, 2> for KinematicBicycle {
     const LARGEST_DEGREE: usize = VEHICLE_DEGREE;
     const SLOW_CURVATURE: bool = true;
-
-    fn is_same(&self, other: &Self) -> bool {
-        self == other
-    }
 
     #[inline]
     fn drift<S: Scalar>(&self, x: &[S; 5]) -> [S; 5] {

@@ -24,23 +24,23 @@ fn the_counter_counts() {
 fn filters() -> Vec<(&'static str, Filter)> {
     let settings = BarrierSettings::within(5.0);
     let repeated = BarrierSettings { method: Method::RepeatedRoot, ..settings };
-    let bounded = Filter::builder(4, 2)
-        .barrier("goal", PointMass, distance_disc(), settings)
+    let bounded = Filter::builder(PointMass)
+        .barrier("goal", distance_disc(), settings)
         .and_then(|b| b.bounds(&[-50.0, -50.0], &[50.0, 50.0]))
         .and_then(punctual_core::filter::FilterBuilder::build)
         .expect("valid filter");
     let sampled = |sampling: Sampling| {
-        Filter::builder(4, 2)
-            .barrier("goal", Unicycle, distance_disc(), settings)
+        Filter::builder(Unicycle)
+            .barrier("goal", distance_disc(), settings)
             .and_then(|b| b.sampling(sampling))
             .and_then(punctual_core::filter::FilterBuilder::build)
             .expect("valid filter")
     };
     let several = |sampling: Sampling| {
-        Filter::builder(4, 2)
-            .barrier("goal", PointMass, distance_disc(), settings)
-            .and_then(|b| b.barrier("soon", PointMass, distance_disc(), BarrierSettings::within(3.0)))
-            .and_then(|b| b.barrier("near", PointMass, quadratic_disc(), BarrierSettings::within(4.0)))
+        Filter::builder(PointMass)
+            .barrier("goal", distance_disc(), settings)
+            .and_then(|b| b.barrier("soon", distance_disc(), BarrierSettings::within(3.0)))
+            .and_then(|b| b.barrier("near", quadratic_disc(), BarrierSettings::within(4.0)))
             .and_then(|b| b.bounds(&[-5.0, -5.0], &[5.0, 5.0]))
             .and_then(|b| b.sampling(sampling))
             .and_then(punctual_core::filter::FilterBuilder::build)

@@ -17,11 +17,9 @@ const AFTER: f64 = 0.35;
 /// A goal within 6 s and an obstacle on the way, armed `after` s.
 fn filter(after: f64, sampling: Sampling, delay: f64) -> Filter {
     let disc = |centre, radius| DistanceDisc::new(centre, radius, 1.0).expect("valid disc");
-    Filter::builder(4, 2)
-        .barrier("goal", PointMass, disc([20.0, 12.0], 2.0), BarrierSettings::within(6.0))
-        .and_then(|b| {
-            b.barrier("rock", PointMass, Outside(disc([10.0, 7.0], 2.0)), BarrierSettings::keeping())
-        })
+    Filter::builder(PointMass)
+        .barrier("goal", disc([20.0, 12.0], 2.0), BarrierSettings::within(6.0))
+        .and_then(|b| b.barrier("rock", Outside(disc([10.0, 7.0], 2.0)), BarrierSettings::keeping()))
         .and_then(|b| b.bounds(&BOUNDS.map(|b| -b), &BOUNDS))
         .and_then(|b| b.sampling(sampling))
         .and_then(|b| b.actuation_delay(delay))
@@ -284,7 +282,7 @@ fn plans_are_decided_on_when_it_is_armed() {
 #[test]
 fn a_time_that_is_none_is_refused() {
     for bad in [-1e-9, f64::NAN, f64::INFINITY] {
-        let error = Filter::builder(4, 2).arm_after(bad).err().expect("out of range").to_string();
+        let error = Filter::from_sources(4, 2).arm_after(bad).err().expect("out of range").to_string();
         assert_eq!(error, format!("arm_after: is {bad}, must be finite and >= 0"));
     }
 }

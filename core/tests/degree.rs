@@ -2,6 +2,8 @@
 
 mod support;
 
+use std::sync::Arc;
+
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::dynamics::{ControlAffine, DynPlant, IntegratedInput, rk4_step};
@@ -26,11 +28,11 @@ fn kinematic() -> KinematicBicycle {
 
 fn filter_of<P, B, const NX: usize, const NU: usize>(plant: P, barrier: B) -> Result<Filter, Error>
 where
-    P: ControlAffine<NX, NU> + Send + 'static,
+    P: ControlAffine<NX, NU> + Send + Sync + 'static,
     B: Barrier<NX> + Send + 'static,
 {
     let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(5.0) };
-    Filter::builder(NX, NU).barrier("goal", plant, barrier, settings).and_then(FilterBuilder::build)
+    Filter::builder(plant).barrier("goal", barrier, settings).and_then(FilterBuilder::build)
 }
 
 #[test]
@@ -158,8 +160,8 @@ fn what_no_input_reaches_is_refused() {
 #[test]
 fn a_declared_degree_is_compared() {
     let declared = |n: usize, samples: &[[f64; 4]]| {
-        Filter::builder(4, 2)
-            .barrier_of_degree("goal", Unicycle, distance_disc(), (n, samples), BarrierSettings::within(5.0))
+        Filter::builder(Unicycle)
+            .barrier_of_degree("goal", distance_disc(), (n, samples), BarrierSettings::within(5.0))
             .and_then(FilterBuilder::build)
             .map(|f| f.relative_degrees().collect::<Vec<_>>())
     };
@@ -196,7 +198,7 @@ fn bicycles_steered_by_rates_arrive_and_stay() {
 
 fn arrives<P>(plant: P, deadline: f64) -> bool
 where
-    P: ControlAffine<5, 2> + Send + Copy + 'static,
+    P: ControlAffine<5, 2> + Send + Sync + Copy + 'static,
 {
     let disc = DistanceDisc::new([20.0, 10.0], 2.0, 2.0).expect("valid disc");
     let mut filter = filter_of(plant, disc).expect("uniform");
@@ -268,7 +270,7 @@ fn a_moving_disc_is_a_disc_at_rest_for_who_moves_along() {
     let disc = || DistanceDisc::new(centre, 2.5, 0.75).expect("valid disc");
     let of = |disc: DistanceDisc, t: f64, x: [f64; 4]| {
         let mut found = Derivatives::ZERO;
-        lie::along(PointMass, disc, 2).expect("in range").evaluate(t, &x, &mut found);
+        lie::along(Arc::new(PointMass), disc, 2).expect("in range").evaluate(t, &x, &mut found);
         found
     };
     let moving = of(disc().moving(velocity).expect("finite"), t, x);

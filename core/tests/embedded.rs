@@ -1,5 +1,7 @@
 //! A source of derivatives on some states of a larger plant.
 
+use std::sync::Arc;
+
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::lie::{Ahead, DerivativeSource, Derivatives, Direction, along, embedded, external};
 use punctual_core::plants::PointMass;
@@ -11,7 +13,7 @@ const OWN: [f64; 4] = [1.0, 2.0, 0.3, 0.4];
 fn sources() -> (Box<dyn DerivativeSource>, Box<dyn DerivativeSource>) {
     let source = || {
         let disc = DistanceDisc::new([4.0, 5.0], 2.0, 2.0).expect("valid disc");
-        along(PointMass, disc, 2).expect("in range")
+        along(Arc::new(PointMass), disc, 2).expect("in range")
     };
     (source(), embedded(source(), 7, &[6, 1, 3, 2]).expect("valid picks"))
 }
@@ -83,7 +85,7 @@ fn what_the_source_cannot_the_picked_one_cannot() {
 fn picks_are_checked() {
     let refused = |picks: &[usize]| {
         let disc = DistanceDisc::new([4.0, 5.0], 2.0, 2.0).expect("valid disc");
-        let source = along(PointMass, disc, 2).expect("in range");
+        let source = along(Arc::new(PointMass), disc, 2).expect("in range");
         embedded(source, 5, picks).err().map(|e| e.to_string())
     };
     assert_eq!(refused(&[0, 1, 2]).as_deref(), Some("picks: has 3 components, must have 4"));

@@ -1,6 +1,8 @@
 //! A filter that is handed the derivatives, against one that computes them: the same bits, and the same
 //! derivative of a sample.
 
+use std::sync::Arc;
+
 use punctual_core::barriers::{DistanceDisc, NormBound};
 use punctual_core::filter::{BarrierSettings, Filter, SampleDerivative, Sampling, Status};
 use punctual_core::lie::{self, Ahead, DerivativeSource, Derivatives, Direction};
@@ -17,14 +19,17 @@ const DEADLINE: f64 = 4.0;
 fn sources() -> [Box<dyn DerivativeSource>; 2] {
     let goal = DistanceDisc::new([12.0, 5.0], 2.0, 2.0).expect("valid disc");
     let speed = NormBound::of_one(3, 6.0).expect("valid bound");
-    [lie::along(Unicycle, goal, 2).expect("in range"), lie::along(Unicycle, speed, 1).expect("in range")]
+    [
+        lie::along(Arc::new(Unicycle), goal, 2).expect("in range"),
+        lie::along(Arc::new(Unicycle), speed, 1).expect("in range"),
+    ]
 }
 
 fn filter(sources: [Box<dyn DerivativeSource>; 2]) -> Filter {
     let settings = BarrierSettings { margin: 0.1, ..BarrierSettings::within(DEADLINE) };
     let dim = sources[0].state_dim();
     let [goal, speed] = sources;
-    Filter::builder(dim, INPUTS)
+    Filter::from_sources(dim, INPUTS)
         .source("goal", goal, settings)
         .and_then(|b| b.source("speed", speed, settings))
         .and_then(|b| b.bounds(&[-30.0; INPUTS], &[30.0; INPUTS]))
@@ -118,7 +123,7 @@ fn without_a_prediction_a_step_is_pointwise_and_a_delay_refused() {
     let settings = BarrierSettings { margin: 0.1, ..BarrierSettings::within(DEADLINE) };
     let builder = || {
         let source = lie::external(1, 1).expect("in range");
-        Filter::builder(3, 1).source("h", source, settings).expect("valid settings")
+        Filter::from_sources(3, 1).source("h", source, settings).expect("valid settings")
     };
     let mut filter = builder().sampling(Sampling::Period(0.1)).and_then(|b| b.build()).expect("a filter");
     let mut u = [0.0];

@@ -2,6 +2,8 @@
 
 mod scenario;
 
+use std::sync::Arc;
+
 use proptest::prelude::*;
 use punctual_core::barrier::Barrier;
 use punctual_core::convergence::FixedTimeState;
@@ -25,11 +27,11 @@ fn step(filter: &mut Filter, t: f64, x: &[f64]) -> ([f64; 2], Status) {
 /// A filter without regard to how long inputs are held.
 fn pointwise<P, B>(plant: P, barrier: B, settings: BarrierSettings) -> Filter
 where
-    P: ControlAffine<4, 2> + Send + 'static,
+    P: ControlAffine<4, 2> + Send + Sync + 'static,
     B: Barrier<4> + Send + 'static,
 {
-    Filter::builder(4, 2)
-        .barrier("goal", plant, barrier, settings)
+    Filter::builder(plant)
+        .barrier("goal", barrier, settings)
         .and_then(|b| b.sampling(Sampling::Pointwise))
         .and_then(FilterBuilder::build)
         .expect("valid filter")
@@ -113,8 +115,8 @@ fn a_start_inside_that_cannot_stay_is_not_promised() {
 
 #[test]
 fn anchoring_waits_for_the_first_valid_sample() {
-    let mut filter = Filter::builder(4, 2)
-        .barrier("goal", PointMass, distance_disc(), BarrierSettings::within(5.0))
+    let mut filter = Filter::builder(PointMass)
+        .barrier("goal", distance_disc(), BarrierSettings::within(5.0))
         .and_then(|b| b.bounds(&[1.0, -60.0], &[60.0, 60.0]))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
@@ -179,7 +181,7 @@ fn the_margin_is_reached_by_the_deadline_and_kept() {
 /// is held, and Mδ is seen at the next sample as the slack of its row at the input that was held.
 fn follows_its_profile<P>(plant: &P, damping: fn(f64, &[f64; 4]) -> [f64; 2], step: f64, x0: [f64; 4])
 where
-    P: ControlAffine<4, 2> + Send + Clone + 'static,
+    P: ControlAffine<4, 2> + Send + Sync + Clone + 'static,
 {
     /// The slack is seen at the ends of the periods; within one it may dip a little lower.
     const WITHIN_THE_PERIOD: f64 = 1.1;
@@ -220,14 +222,14 @@ fn h_follows_its_profile_up_to_the_sampling_error() {
 #[test]
 fn the_arrival_of_a_bounded_one_dimensional_run_is_on_time() {
     // ẋ₁ = x₂, ẋ₂ = u, h = x₁ from −1: n = 2 by hand, through `source`.
-    let source = lie::along(Integrator::<2>, NonNegative, 2).expect("in range");
+    let source = lie::along(Arc::new(Integrator::<2>), NonNegative, 2).expect("in range");
     let settings = BarrierSettings {
         margin: 0.05,
         rate: Some(3.0),
         stay_rate: Some(3.0),
         ..BarrierSettings::within(5.0)
     };
-    let mut filter = Filter::builder(2, 1)
+    let mut filter = Filter::from_sources(2, 1)
         .source("line", source, settings)
         .and_then(|b| b.bounds(&[-1.0], &[1.0]))
         .and_then(FilterBuilder::build)
@@ -303,8 +305,8 @@ proptest! {
         samples in prop::collection::vec((any::<f64>(), prop::array::uniform4(any::<f64>()), prop::array::uniform2(any::<f64>())), 1..6),
         bounded in any::<bool>(),
     ) {
-        let mut builder = Filter::builder(4, 2)
-            .barrier("goal", Unicycle, distance_disc(), BarrierSettings::within(5.0)).expect("valid settings");
+        let mut builder = Filter::builder(Unicycle)
+            .barrier("goal", distance_disc(), BarrierSettings::within(5.0)).expect("valid settings");
         let high = if bounded { [60.0, 20.0] } else { [f64::INFINITY; 2] };
         builder = builder.bounds(&high.map(|v| -v), &high).expect("valid bounds");
         let mut filter = builder.build().expect("valid filter");
@@ -318,14 +320,11 @@ proptest! {
 
 #[test]
 fn two_barriers_are_both_met() {
-    let mut filter = Filter::builder(4, 2)
-        .barrier(
-            "goal",
-            PointMass,
-            distance_disc(),
-            BarrierSettings { margin: 0.05, ..BarrierSettings::within(5.0) },
-        )
-        .and_then(|b| b.source("line", lie::along(PointMass, NonNegative, 2)?, BarrierSettings::within(2.0)))
+    let mut filter = Filter::builder(PointMass)
+        .barrier("goal", distance_disc(), BarrierSettings { margin: 0.05, ..BarrierSettings::within(5.0) })
+        .and_then(|b| {
+            b.source("line", lie::along(Arc::new(PointMass), NonNegative, 2)?, BarrierSettings::within(2.0))
+        })
         .and_then(FilterBuilder::build)
         .expect("valid filter");
     assert_eq!(filter.barrier_names().collect::<Vec<_>>(), ["goal", "line"]);
@@ -346,8 +345,8 @@ fn two_barriers_are_both_met() {
 
 #[test]
 fn bounds_that_forbid_the_row_are_infeasible_and_void_the_guarantee() {
-    let mut filter = Filter::builder(4, 2)
-        .barrier("goal", PointMass, distance_disc(), BarrierSettings::within(0.5))
+    let mut filter = Filter::builder(PointMass)
+        .barrier("goal", distance_disc(), BarrierSettings::within(0.5))
         .and_then(|b| b.bounds(&[-1.0, -2.0], &[1.0, 2.0]))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
@@ -390,9 +389,9 @@ fn goal_quadratic(deadline: f64) -> Filter {
 /// One barrier without finite derivatives stops the step: no other barrier is anchored by it.
 #[test]
 fn a_singular_barrier_anchors_none() {
-    let mut filter = Filter::builder(4, 2)
-        .barrier("line", PointMass, NonNegative, BarrierSettings::within(2.0))
-        .and_then(|b| b.barrier("goal", PointMass, distance_disc(), BarrierSettings::within(2.0)))
+    let mut filter = Filter::builder(PointMass)
+        .barrier("line", NonNegative, BarrierSettings::within(2.0))
+        .and_then(|b| b.barrier("goal", distance_disc(), BarrierSettings::within(2.0)))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
     let (_, status) = step(&mut filter, 0.0, &[1e200, 0.0, 0.0, 0.0]);

@@ -99,7 +99,10 @@ fn keeping() -> BarrierSettings {
     BarrierSettings { margin: 0.02, ..BarrierSettings::keeping() }
 }
 
-fn built(builder: Result<FilterBuilder, punctual_core::Error>, bounds: &[f64]) -> Filter {
+fn built<P, const NX: usize, const NU: usize>(
+    builder: Result<FilterBuilder<P, NX, NU>, punctual_core::Error>,
+    bounds: &[f64],
+) -> Filter {
     let least: Vec<f64> = bounds.iter().map(|b| -b).collect();
     builder
         .and_then(|b| b.bounds(&least, bounds))
@@ -145,9 +148,9 @@ impl World for Loiter {
     }
     fn filter(&self) -> Filter {
         let disc = |(centre, radius)| DistanceDisc::new(centre, radius, 1.0).expect("valid disc");
-        let builder = Filter::builder(3, 1)
-            .barrier("goal", Glider(self.speed), disc(self.goal), within(self.deadline))
-            .and_then(|b| b.barrier("tower", Glider(self.speed), Outside(disc(self.tower)), keeping()));
+        let builder = Filter::builder(Glider(self.speed))
+            .barrier("goal", disc(self.goal), within(self.deadline))
+            .and_then(|b| b.barrier("tower", Outside(disc(self.tower)), keeping()));
         built(builder, &self.bounds())
     }
     fn deadline(&self) -> f64 {
@@ -197,10 +200,10 @@ impl World for Chase {
         let [slow, fast] = [StateBound::at_least(3, self.speeds[0]), StateBound::at_most(3, self.speeds[1])]
             .map(|bound| bound.expect("a bound"));
         let settings = BarrierSettings { margin: 0.0, ..keeping() };
-        let builder = Filter::builder(4, 2)
-            .barrier("disc", Unicycle, self.disc, within(self.deadline))
-            .and_then(|b| b.barrier("slow", Unicycle, slow, settings))
-            .and_then(|b| b.barrier("fast", Unicycle, fast, settings));
+        let builder = Filter::builder(Unicycle)
+            .barrier("disc", self.disc, within(self.deadline))
+            .and_then(|b| b.barrier("slow", slow, settings))
+            .and_then(|b| b.barrier("fast", fast, settings));
         built(builder, &self.bounds())
     }
     fn deadline(&self) -> f64 {
@@ -319,7 +322,7 @@ impl<const NX: usize> Barrier<NX> for Fleeing {
 }
 
 fn fleeing(horizon: Option<f64>) -> Result<Filter, punctual_core::Error> {
-    let builder = Filter::builder(4, 2).barrier("strip", Unicycle, Fleeing, keeping());
+    let builder = Filter::builder(Unicycle).barrier("strip", Fleeing, keeping());
     built(builder, &[1.0, 1.0]).with_plans(Plans::every(PERIOD).horizon(horizon))
 }
 
@@ -402,11 +405,9 @@ impl<const NX: usize> Barrier<NX> for Pulse {
 fn a_set_that_moves_once_is_not_promised_for_ever() {
     let mut random = Random(0x9E37_79B9_7F4A_7C15);
     let assured = |pulse: Pulse, end: End| {
-        let builder = Filter::builder(4, 2)
-            .barrier("goal", PointMass, DistanceDisc::new([3.0, 0.0], 1.0, 1.0).expect("a disc"), keeping())
-            .and_then(|b| {
-                b.barrier("gate", PointMass, pulse, BarrierSettings { deadline: None, ..keeping() })
-            })
+        let builder = Filter::builder(PointMass)
+            .barrier("goal", DistanceDisc::new([3.0, 0.0], 1.0, 1.0).expect("a disc"), keeping())
+            .and_then(|b| b.barrier("gate", pulse, BarrierSettings { deadline: None, ..keeping() }))
             .and_then(|b| b.window(Begin::AtOnce, end));
         built(builder, &[2.0, 2.0]).with_plans(PERIOD)
     };

@@ -177,7 +177,7 @@ fn programs_that_cannot_be_met() {
 /// A filter at a state, and what its step must report.
 struct Situation {
     name: &'static str,
-    filter: FilterBuilder,
+    filter: FilterBuilder<PointMass, 4, 2>,
     x: [f64; 4],
     limit: f64,
     status: Status,
@@ -192,13 +192,13 @@ fn side(normal: f64, x: f64) -> HalfPlane {
 }
 
 /// x ≤ 1 m, slowly, and x ≥ 2 m within 1 s: from rest 1 m/s² is allowed and 6 · 2/1² m/s² needed.
-fn wall_before_goal(priorities: Option<[u32; 2]>) -> FilterBuilder {
+fn wall_before_goal(priorities: Option<[u32; 2]>) -> FilterBuilder<PointMass, 4, 2> {
     let slow = BarrierSettings { rate: Some(1.0), stay_rate: Some(1.0), ..BarrierSettings::within(1.0) };
     let [goal, wall] = priorities.map_or([Strictness::KeepFirst; 2], |p| p.map(Strictness::Priority));
-    Filter::builder(4, 2)
-        .barrier("goal", PointMass, side(1.0, 2.0), BarrierSettings::within(1.0))
+    Filter::builder(PointMass)
+        .barrier("goal", side(1.0, 2.0), BarrierSettings::within(1.0))
         .and_then(|b| b.strictness(goal))
-        .and_then(|b| b.barrier("wall", PointMass, side(-1.0, 1.0), slow))
+        .and_then(|b| b.barrier("wall", side(-1.0, 1.0), slow))
         .and_then(|b| b.strictness(wall))
         .expect("valid barriers")
 }
@@ -206,7 +206,7 @@ fn wall_before_goal(priorities: Option<[u32; 2]>) -> FilterBuilder {
 fn situations() -> Vec<Situation> {
     let one = |name: &str, barrier, seconds: f64| {
         let settings = BarrierSettings::within(seconds);
-        Filter::builder(4, 2).barrier(name, PointMass, barrier, settings).expect("valid barrier")
+        Filter::builder(PointMass).barrier(name, barrier, settings).expect("valid barrier")
     };
     vec![
         Situation {
@@ -243,7 +243,7 @@ fn situations() -> Vec<Situation> {
             filter: {
                 let slow =
                     BarrierSettings { rate: Some(1.0), stay_rate: Some(1.0), ..BarrierSettings::within(1.0) };
-                let wall = Filter::builder(4, 2).barrier("wall", PointMass, side(-1.0, 1.0), slow);
+                let wall = Filter::builder(PointMass).barrier("wall", side(-1.0, 1.0), slow);
                 wall.expect("valid barrier")
             },
             x: [0.5, 0.0, 3.0, 0.0],

@@ -4,6 +4,8 @@
 
 mod support;
 
+use std::sync::Arc;
+
 use punctual_core::ErrorKind;
 use punctual_core::filter::{BarrierSettings, Filter, Status};
 use punctual_core::lie::{self, Ahead, Derivatives};
@@ -75,14 +77,14 @@ fn derivatives_equal_the_algebra() {
 
 #[test]
 fn a_degree_declared_too_high_is_seen_and_refused_at_the_step() {
-    let source = lie::along(Unicycle, SpeedLimit, 2).expect("in range");
+    let source = lie::along(Arc::new(Unicycle), SpeedLimit, 2).expect("in range");
     let x = [0.0, 0.0, 0.5, 3.0];
     let mut found = Derivatives::ZERO;
     source.evaluate(0.0, &x, &mut found);
     // h = 30 − v²/4, so ∂ḣ/∂a = −v/2.
     assert_eq!(found.lower_sensitivity, 1.5);
 
-    let mut filter = Filter::builder(4, 2)
+    let mut filter = Filter::from_sources(4, 2)
         .source("speed", source, BarrierSettings::within(5.0))
         .and_then(punctual_core::filter::FilterBuilder::build)
         .expect("valid filter");
@@ -94,7 +96,7 @@ fn a_degree_declared_too_high_is_seen_and_refused_at_the_step() {
 
 #[test]
 fn a_degree_declared_too_low_has_no_row() {
-    let source = lie::along(PointMass, quadratic_disc(), 1).expect("in range");
+    let source = lie::along(Arc::new(PointMass), quadratic_disc(), 1).expect("in range");
     let mut found = Derivatives::ZERO;
     source.evaluate(0.0, &[1.0, 2.0, 3.0, 4.0], &mut found);
     assert_eq!((found.row, found.lower_sensitivity), ([0.0; punctual_core::MAX_INPUTS], 0.0));
@@ -103,7 +105,7 @@ fn a_degree_declared_too_low_has_no_row() {
 #[test]
 fn degrees_out_of_range_are_refused() {
     for n in [0, 3, punctual_core::MAX_RELATIVE_DEGREE, usize::MAX] {
-        let Err(error) = lie::along(PointMass, quadratic_disc(), n) else { panic!("{n} accepted") };
+        let Err(error) = lie::along(Arc::new(PointMass), quadratic_disc(), n) else { panic!("{n} accepted") };
         assert_eq!(error.kind(), ErrorKind::RelativeDegree);
         assert_eq!(error.to_string(), format!("relative_degree: is {n}, must be 1 to 2"));
     }
@@ -114,7 +116,7 @@ fn degrees_out_of_range_are_refused() {
 fn what_a_row_takes_is_part_of_all_derivatives() {
     let (x, u) = ([1.0, -2.0, 0.8, 6.0], [0.7, -1.3]);
     for n in 1..=2 {
-        let source = lie::along(Unicycle, quadratic_disc(), n).expect("in range");
+        let source = lie::along(Arc::new(Unicycle), quadratic_disc(), n).expect("in range");
         let model = source.predict().expect("a model");
         // One Runge-Kutta step and two.
         for duration in [0.0, 0.001, 0.5] {

@@ -2,6 +2,8 @@
 
 mod support;
 
+use std::sync::Arc;
+
 use punctual_core::Error;
 use punctual_core::barriers::StateBound;
 use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Method, SampleDerivative, Sampling};
@@ -17,8 +19,8 @@ fn settings() -> BarrierSettings {
 }
 
 fn unicycle(errors: &[f64]) -> Filter {
-    Filter::builder(4, 2)
-        .barrier("goal", Unicycle, distance_disc(), settings())
+    Filter::builder(Unicycle)
+        .barrier("goal", distance_disc(), settings())
         .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
         .and_then(|b| b.measurement_errors(errors))
         .and_then(|b| b.build())
@@ -31,8 +33,8 @@ fn unicycle(errors: &[f64]) -> Filter {
 fn with_linear_derivatives_it_is_the_filter_of_the_worst_state() {
     let line = || StateBound::at_least(0, 30.0).expect("a valid barrier");
     let filter = |errors: &[f64]| {
-        Filter::builder(4, 2)
-            .barrier("line", PointMass, line(), settings())
+        Filter::builder(PointMass)
+            .barrier("line", line(), settings())
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(|b| b.measurement_errors(errors))
             .and_then(|b| b.build())
@@ -57,8 +59,8 @@ fn with_linear_derivatives_it_is_the_filter_of_the_worst_state() {
 #[test]
 fn errors_of_zero_are_none() {
     let mut filters = [unicycle(&[0.0; 4]), {
-        Filter::builder(4, 2)
-            .barrier("goal", Unicycle, distance_disc(), settings())
+        Filter::builder(Unicycle)
+            .barrier("goal", distance_disc(), settings())
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(|b| b.build())
             .expect("a valid filter")
@@ -73,7 +75,7 @@ fn errors_of_zero_are_none() {
         });
         assert_eq!(a, b);
         let u = a.map(f64::from_bits);
-        let source = lie::along(Unicycle, distance_disc(), 2).expect("in range");
+        let source = lie::along(Arc::new(Unicycle), distance_disc(), 2).expect("in range");
         source.predict().expect("a model").flow(&mut x, &u, PERIOD);
     }
 }
@@ -131,7 +133,7 @@ fn derivatives_with_errors_are_those_of_the_sample() {
 #[test]
 fn what_is_refused() {
     let builder = |settings| {
-        Filter::builder(4, 2).barrier("goal", Unicycle, distance_disc(), settings).expect("a valid barrier")
+        Filter::builder(Unicycle).barrier("goal", distance_disc(), settings).expect("a valid barrier")
     };
     let refused = |message: &str, done: Result<Filter, Error>| {
         assert_eq!(done.err().map(|e| e.to_string()).as_deref(), Some(message));
@@ -141,7 +143,7 @@ fn what_is_refused() {
     refused("measurement_errors: has 3 components, must have 4", given(&[0.1; 3]));
     refused("measurement_errors[2]: is -0.5, must be finite and >= 0", given(&[0.1, -0.5, 0.0, 0.0]));
     refused("measurement_errors[1]: is inf, must be finite and >= 0", given(&[f64::INFINITY, 0.0, 0.0, 0.0]));
-    type Change = fn(FilterBuilder) -> Result<FilterBuilder, Error>;
+    type Change = fn(FilterBuilder<Unicycle, 4, 2>) -> Result<FilterBuilder<Unicycle, 4, 2>, Error>;
     let with = |change: Change| {
         builder(settings()).measurement_errors(&errors).and_then(change).and_then(FilterBuilder::build)
     };
@@ -160,7 +162,7 @@ fn what_is_refused() {
         done,
     );
     // h and the two parts of its row.
-    let done = Filter::builder(4, 2)
+    let done = Filter::from_sources(4, 2)
         .source("goal", lie::external(1, 2).expect("in range"), settings())
         .and_then(|b| b.measurement_errors(&errors))
         .and_then(FilterBuilder::build);

@@ -72,11 +72,11 @@ impl Vehicle {
     ) -> Result<FilterBuilder, punctual_core::Error> {
         macro_rules! along {
             ($plant:expr) => {{
-                let builder = Filter::builder(4, 2).barrier("goal", $plant, goal.0, goal.1)?;
-                match clear {
-                    Some((clear, settings)) => builder.barrier("clear", $plant, clear, settings),
-                    None => Ok(builder),
-                }
+                let builder = Filter::builder($plant).barrier("goal", goal.0, goal.1)?;
+                Ok(match clear {
+                    Some((clear, settings)) => builder.barrier("clear", clear, settings)?.erased(),
+                    None => builder.erased(),
+                })
             }};
         }
         match self {
@@ -228,8 +228,8 @@ fn the_earliest_deadline_is_taken_and_kept() {
     for infeasible in [Infeasible::Report, Infeasible::Earliest] {
         let goal = DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
         let settings = BarrierSettings { infeasible, ..BarrierSettings::within(2.0) };
-        let filter = Filter::builder(4, 2)
-            .barrier("goal", PointMass, goal, settings)
+        let filter = Filter::builder(PointMass)
+            .barrier("goal", goal, settings)
             .and_then(|b| b.bounds(&[-4.0; 2], &[4.0; 2]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
@@ -263,8 +263,8 @@ fn the_earliest_deadline_is_taken_and_kept() {
 fn the_earliest_deadline_is_near_what_physics_allows() {
     let goal = DistanceDisc::new([30.0, 0.0], 1.0, 1.0).expect("valid disc");
     for (deadline, bound) in [(2.0, 2.0), (20.0, 2.0), (5.0, 7.0)] {
-        let filter = Filter::builder(4, 2)
-            .barrier("goal", PointMass, goal, BarrierSettings::within(deadline))
+        let filter = Filter::builder(PointMass)
+            .barrier("goal", goal, BarrierSettings::within(deadline))
             .and_then(|b| b.bounds(&[-bound; 2], &[bound; 2]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
@@ -409,8 +409,8 @@ fn steps_of_other_lengths_keep_the_promise_or_end_it() {
 #[test]
 fn what_is_let_go_on_arrival_is_not_promised_after() {
     let disc = DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
-    let filter = Filter::builder(4, 2)
-        .barrier("goal", PointMass, disc, BarrierSettings::within(8.0))
+    let filter = Filter::builder(PointMass)
+        .barrier("goal", disc, BarrierSettings::within(8.0))
         .and_then(|b| b.window(Begin::AtOnce, End::OnArrival))
         .and_then(|b| b.bounds(&[-4.0; 2], &[4.0; 2]))
         .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
@@ -674,8 +674,8 @@ fn the_cost_of_a_step_does_not_grow_as_it_gets_shorter() {
     }
     let asked = |hold: f64, first: bool| {
         let goal = DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
-        let filter = Filter::builder(4, 2)
-            .barrier("goal", Counted, goal, BarrierSettings::within(8.0))
+        let filter = Filter::builder(Counted)
+            .barrier("goal", goal, BarrierSettings::within(8.0))
             .and_then(|b| b.bounds(&[-6.0, -2.5], &[6.0, 2.5]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
@@ -766,7 +766,7 @@ fn a_plan_of_another_period_ends_as_irregular() {
 fn small_sets_are_promised_from_far_away() {
     let quadratic = QuadraticDisc::new([150.0, 0.0], 1.0).expect("valid disc");
     let disc = DistanceDisc::new([2000.0, 0.0], 0.3, 0.3).expect("valid disc");
-    let far = |builder: Result<FilterBuilder, punctual_core::Error>| {
+    let far = |builder: Result<FilterBuilder<PointMass, 4, 2>, punctual_core::Error>| {
         let filter = builder
             .and_then(|b| b.bounds(&[-8.0; 2], &[8.0; 2]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
@@ -775,13 +775,13 @@ fn small_sets_are_promised_from_far_away() {
         let filter = filter.with_plans(PERIOD).expect("a filter that can be assured");
         filter.planning().expect("plans").plan_from(0.0, &[0.0; 4], 1.0)
     };
-    let builder = || Filter::builder(4, 2);
-    let small = far(builder().barrier("goal", PointMass, quadratic, BarrierSettings::within(12.0)));
+    let builder = || Filter::builder(PointMass);
+    let small = far(builder().barrier("goal", quadratic, BarrierSettings::within(12.0)));
     assert!(small.is_ok(), "{small:?}");
-    let distant = far(builder().barrier("goal", PointMass, disc, BarrierSettings::within(60.0)));
+    let distant = far(builder().barrier("goal", disc, BarrierSettings::within(60.0)));
     assert!(distant.is_ok(), "{distant:?}");
     // Not where nothing is left: too soon.
-    let soon = far(builder().barrier("goal", PointMass, quadratic, BarrierSettings::within(6.0)));
+    let soon = far(builder().barrier("goal", quadratic, BarrierSettings::within(6.0)));
     assert!(matches!(soon, Err(Failure::Broken { .. })), "{soon:?}");
 }
 
@@ -791,8 +791,8 @@ fn a_vehicle_at_the_edge_comes_to_rest_there() {
     for margin in [0.02, 0.0] {
         let disc = DistanceDisc::new([0.0; 2], 2.0, 1.0).expect("valid disc");
         let settings = BarrierSettings { margin, ..BarrierSettings::keeping() };
-        let filter = Filter::builder(4, 2)
-            .barrier("room", PointMass, disc, settings)
+        let filter = Filter::builder(PointMass)
+            .barrier("room", disc, settings)
             .and_then(|b| b.bounds(&[-4.0; 2], &[4.0; 2]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
@@ -829,8 +829,8 @@ fn a_wall_is_promised_at_every_period() {
         let (bound, speed) = (random.between(2.0, 20.0), random.between(0.5, 8.0));
         let room = speed * speed / (2.0 * bound) * random.between(1.3, 10.0) + 2.0 * speed * period;
         let wall = StateBound::at_most(0, room).expect("valid bound");
-        let filter = Filter::builder(4, 2)
-            .barrier("wall", PointMass, wall, BarrierSettings::keeping())
+        let filter = Filter::builder(PointMass)
+            .barrier("wall", wall, BarrierSettings::keeping())
             .and_then(|b| b.bounds(&[-bound; 2], &[bound; 2]))
             .and_then(|b| b.sampling(Sampling::Period(period)))
             .and_then(FilterBuilder::build)
@@ -1153,8 +1153,8 @@ fn a_plant_that_is_not_the_model_ends_the_promise() {
 fn filters_that_plans_do_not_account_for_are_refused() {
     let disc = || DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
     let refused = |settings: BarrierSettings, change: fn(FilterBuilder) -> FilterBuilder| {
-        let builder = Filter::builder(4, 2).barrier("goal", PointMass, disc(), settings).expect("valid");
-        let filter = change(builder).build().expect("valid filter");
+        let builder = Filter::builder(PointMass).barrier("goal", disc(), settings).expect("valid");
+        let filter = change(builder.erased()).build().expect("valid filter");
         filter.with_plans(PERIOD).err().map(|error| error.to_string()).unwrap_or_default()
     };
     let within = BarrierSettings::within(5.0);
@@ -1173,8 +1173,8 @@ fn filters_that_plans_do_not_account_for_are_refused() {
     assert_eq!(refused(within, |b| b), "");
     let moving =
         QuadraticDisc::new(GOAL.0, GOAL.1).expect("valid disc").moving([1.0, 0.0]).expect("a velocity");
-    let filter = Filter::builder(4, 2)
-        .barrier("goal", PointMass, moving, within)
+    let filter = Filter::builder(PointMass)
+        .barrier("goal", moving, within)
         .and_then(FilterBuilder::build)
         .expect("valid filter");
     let moves = filter.with_plans(PERIOD).err().map(|error| error.to_string());
@@ -1309,15 +1309,21 @@ fn what_begins_later_is_kept_from_then_on() {
 #[test]
 fn one_plan_is_of_one_plant() {
     let disc = || DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
-    let filter = Filter::builder(4, 2)
-        .barrier("goal", PointMass, disc(), BarrierSettings::within(5.0))
-        .and_then(|b| b.barrier("also", Unicycle, disc(), BarrierSettings::within(5.0)))
-        .and_then(FilterBuilder::build)
-        .expect("valid filter");
-    let error = filter.with_plans(PERIOD).err().map(|e| e.to_string()).unwrap_or_default();
-    let message =
-        "also.source: moves the state differently from that of goal; a plan needs one plant for all barriers";
-    assert_eq!(error, message);
+    let (settings, plant) = (BarrierSettings::within(5.0), Arc::new(Unicycle));
+    let refusal = |also| {
+        let filter = Filter::from_sources(4, 2)
+            .source("goal", along(Arc::clone(&plant), disc(), 2).expect("a source"), settings)
+            .and_then(|b| b.source("also", also, settings))
+            .and_then(FilterBuilder::build)
+            .expect("valid filter");
+        filter.with_plans(PERIOD).err().map(|e| e.to_string())
+    };
+    assert_eq!(refusal(along(Arc::clone(&plant), disc(), 2).expect("a source")), None);
+    for other in [along(Arc::new(PointMass), disc(), 2), along(Arc::new(Unicycle), disc(), 2)] {
+        let message =
+            "also.source: is along another plant than that of goal; a plan needs one plant for all barriers";
+        assert_eq!(refusal(other.expect("a source")).as_deref(), Some(message));
+    }
 }
 
 /// Long holds and fast vehicles: an obstacle between two nodes is seen.
@@ -1326,11 +1332,11 @@ fn a_plan_does_not_jump_over_an_obstacle() {
     let mut found = 0;
     for (deadline, radius) in [(60.0, 1.0), (40.0, 0.3), (30.0, 0.05)] {
         let disc = |centre, radius, b| DistanceDisc::new(centre, radius, b).expect("valid disc");
-        let filter = Filter::builder(4, 2)
-            .barrier("goal", PointMass, disc([500.0, 0.0], 3.0, 1.0), BarrierSettings::within(deadline))
+        let filter = Filter::builder(PointMass)
+            .barrier("goal", disc([500.0, 0.0], 3.0, 1.0), BarrierSettings::within(deadline))
             .and_then(|b| {
                 let clear = Outside(disc([251.3, 0.0], radius, radius));
-                b.barrier("clear", PointMass, clear, BarrierSettings::keeping())
+                b.barrier("clear", clear, BarrierSettings::keeping())
             })
             .and_then(|b| b.bounds(&[-6.0; 2], &[6.0; 2]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
@@ -1362,8 +1368,8 @@ fn any_time_is_a_time_to_begin() {
     let vehicle = Vehicle::PointMass;
     for (begin, period) in [(1.7e9, 0.005), (-4.1e5, 0.05)] {
         let disc = DistanceDisc::new([6.0, 3.0], 1.0, 1.0).expect("valid disc");
-        let filter = Filter::builder(4, 2)
-            .barrier("goal", PointMass, disc, BarrierSettings::within(4.0))
+        let filter = Filter::builder(PointMass)
+            .barrier("goal", disc, BarrierSettings::within(4.0))
             .and_then(|b| b.bounds(&[-5.0; 2], &[5.0; 2]))
             .and_then(|b| b.sampling(Sampling::Period(period)))
             .and_then(FilterBuilder::build)
@@ -1396,8 +1402,8 @@ fn what_cannot_be_promised_is_not() {
     // Outside without a deadline nothing is promised, so nothing is assured.
     let filter = |settings| {
         let disc = DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
-        let filter = Filter::builder(4, 2)
-            .barrier("goal", PointMass, disc, settings)
+        let filter = Filter::builder(PointMass)
+            .barrier("goal", disc, settings)
             .and_then(|b| b.bounds(&[-8.0; 2], &[8.0; 2]))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
@@ -1456,13 +1462,8 @@ fn plans_stand_behind_an_integral_too() {
         let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
         let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0).expect("valid disc");
         let model = SmallSlipBicycle::new(LENGTH).expect("a length").with_rate();
-        let filter = Filter::builder(5, 2)
-            .barrier(
-                "goal",
-                model,
-                goal,
-                BarrierSettings { margin: 0.02, ..BarrierSettings::within(deadline) },
-            )
+        let filter = Filter::builder(model)
+            .barrier("goal", goal, BarrierSettings { margin: 0.02, ..BarrierSettings::within(deadline) })
             .and_then(|b| b.bounds(&[-40.0, -4.0], &[40.0, 4.0]))
             .and_then(|b| b.sampling(Sampling::Period(period)))
             .and_then(FilterBuilder::build)
@@ -1542,8 +1543,8 @@ fn a_point_moved_by_its_velocity_is_promised_what_it_can_do() {
     let speed = 5.0;
     let filter = |deadline: f64| {
         let disc = DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
-        let filter = Filter::builder(2, 2)
-            .barrier("goal", MovedPoint, disc, BarrierSettings::within(deadline))
+        let filter = Filter::builder(MovedPoint)
+            .barrier("goal", disc, BarrierSettings::within(deadline))
             .and_then(|b| b.bounds(&[-speed; 2], &[speed; 2]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
@@ -1582,10 +1583,10 @@ fn behind_a_wall(plans: Plans) -> Filter {
     let disc = |(centre, radius)| DistanceDisc::new(centre, radius, 1.0).expect("valid disc");
     let within = BarrierSettings { margin: 0.01, ..BarrierSettings::within(20.0) };
     let keeping = BarrierSettings { margin: 0.01, ..BarrierSettings::keeping() };
-    let mut builder = Filter::builder(4, 2).barrier("goal", PointMass, disc(BEHIND), within).expect("a goal");
+    let mut builder = Filter::builder(PointMass).barrier("goal", disc(BEHIND), within).expect("a goal");
     for (i, y) in wall().enumerate() {
         let clear = Outside(disc(([WALL[0], y], WALL[1])));
-        builder = builder.barrier(&format!("wall_{i}"), PointMass, clear, keeping).expect("an obstacle");
+        builder = builder.barrier(&format!("wall_{i}"), clear, keeping).expect("an obstacle");
     }
     let builder =
         builder.bounds(&[-BOUND; 2], &[BOUND; 2]).and_then(|b| b.sampling(Sampling::Period(PERIOD)));
@@ -1798,11 +1799,11 @@ fn kept<P, const NX: usize>(
     (deadline, steps): (f64, u32),
     wish: u32,
 ) where
-    P: ControlAffine<NX, 1> + Copy + Send + core::fmt::Debug + 'static,
+    P: ControlAffine<NX, 1> + Copy + Send + Sync + core::fmt::Debug + 'static,
 {
     let period = deadline / f64::from(steps);
-    let filter = Filter::builder(NX, 1)
-        .barrier("band", plant, band, BarrierSettings::within(deadline))
+    let filter = Filter::builder(plant)
+        .barrier("band", band, BarrierSettings::within(deadline))
         .and_then(|b| b.bounds(&[low], &[high]))
         .and_then(|b| b.sampling(Sampling::Period(period)))
         .and_then(FilterBuilder::build)
@@ -1943,13 +1944,8 @@ fn no_plan_lets_a_tank_run_dry() {
         let (rate, pump) = (random.between(0.1, 0.4), random.between(0.2, 0.6));
         let (limit, period) = (random.between(0.5, 2.0), random.between(0.1, 2.0));
         let mut x = limit * random.between(0.3, 0.99);
-        let filter = Filter::builder(1, 1)
-            .barrier(
-                "level",
-                Tank(rate),
-                StateBound::at_most(0, limit).expect("a bound"),
-                BarrierSettings::keeping(),
-            )
+        let filter = Filter::builder(Tank(rate))
+            .barrier("level", StateBound::at_most(0, limit).expect("a bound"), BarrierSettings::keeping())
             .and_then(|b| b.bounds(&[0.0], &[pump]))
             .and_then(|b| b.sampling(Sampling::Period(period)))
             .and_then(FilterBuilder::build)
@@ -1979,8 +1975,8 @@ fn a_start_at_the_edge_is_not_lost_to_round_off() {
         let (limit, period) = (random.between(0.2, 0.9), 10.0_f64.powf(random.between(-2.0, -0.5)));
         let speed = [0.0, -1e-3, -0.1][round / 6 % 3];
         let edge = StateBound::at_most(0, limit).expect("a bound");
-        let filter = Filter::builder(4, 2)
-            .barrier("edge", PointMass, edge, BarrierSettings::keeping())
+        let filter = Filter::builder(PointMass)
+            .barrier("edge", edge, BarrierSettings::keeping())
             .and_then(|b| b.bounds(&[-1.0; 2], &[1.0; 2]))
             .and_then(|b| b.sampling(Sampling::Period(period)))
             .and_then(FilterBuilder::build)
@@ -2014,9 +2010,9 @@ fn leaves_the_edge<const N: usize>(random: &mut Random, draws: usize) -> u32 {
         let (inside, deadline) = ([0.0, 1e-12, 1e-9, 1e-7, 1e-5][round % 5], random.between(3.0, 6.0));
         let place = most * (deadline / 6.0).powi(N as i32);
         let band = Band(place, 0.6 * place);
-        let filter = Filter::builder(N, 1)
-            .barrier("band", Integrator::<N>, band, BarrierSettings::within(deadline))
-            .and_then(|b| b.barrier("edge", Integrator::<N>, NonNegative, BarrierSettings::keeping()))
+        let filter = Filter::builder(Integrator::<N>)
+            .barrier("band", band, BarrierSettings::within(deadline))
+            .and_then(|b| b.barrier("edge", NonNegative, BarrierSettings::keeping()))
             .and_then(|b| b.bounds(&[-most], &[most]))
             .and_then(|b| b.sampling(Sampling::Period(period)))
             .and_then(FilterBuilder::build)
@@ -2063,8 +2059,8 @@ fn at_the_edge_the_input_does_not_chatter() {
     const BOUND: f64 = 5.0;
     // A small set without a margin of its own, and a wish that never lets go.
     let goal = QuadraticDisc::new([5.0, 0.0], 0.2).expect("valid disc");
-    let filter = Filter::builder(4, 2)
-        .barrier("goal", PointMass, goal, BarrierSettings::within(4.0))
+    let filter = Filter::builder(PointMass)
+        .barrier("goal", goal, BarrierSettings::within(4.0))
         .and_then(|b| b.bounds(&[-BOUND; 2], &[BOUND; 2]))
         .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
         .and_then(FilterBuilder::build)
@@ -2095,8 +2091,8 @@ fn a_hard_turn_is_found() {
     for factor in [1.1, 1.2, 1.35] {
         let deadline = factor * 2.7681;
         let goal = DistanceDisc::new(centre, radius, radius).expect("valid disc");
-        let filter = Filter::builder(4, 2)
-            .barrier("goal", plant, goal, BarrierSettings::within(deadline))
+        let filter = Filter::builder(plant)
+            .barrier("goal", goal, BarrierSettings::within(deadline))
             .and_then(|b| b.bounds(&[-3.0, -0.5], &[3.0, 0.5]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
@@ -2129,10 +2125,10 @@ fn on_the_way_the_input_does_not_jump_to_and_fro() {
     let goal = DistanceDisc::new([25.0, 15.0], 2.0, 2.0).expect("valid disc");
     let rock = Outside(DistanceDisc::new([20.0, -1.0], 3.0, 3.0).expect("valid disc"));
     let forwards = StateBound::at_least(3, -0.2).expect("valid bound");
-    let filter = Filter::builder(4, 2)
-        .barrier("goal", Unicycle, goal, BarrierSettings::within(10.0))
-        .and_then(|b| b.barrier("rock", Unicycle, rock, BarrierSettings::keeping()))
-        .and_then(|b| b.barrier("forwards", Unicycle, forwards, BarrierSettings::keeping()))
+    let filter = Filter::builder(Unicycle)
+        .barrier("goal", goal, BarrierSettings::within(10.0))
+        .and_then(|b| b.barrier("rock", rock, BarrierSettings::keeping()))
+        .and_then(|b| b.barrier("forwards", forwards, BarrierSettings::keeping()))
         .and_then(|b| b.bounds(&[-BOUND, -1.5], &[BOUND, 1.5]))
         .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
         .and_then(FilterBuilder::build)
@@ -2189,9 +2185,9 @@ impl Barrier<4> for Way {
 impl Way {
     fn filter(&self, deadline: f64) -> Filter {
         let goal = DistanceDisc::new([300.0, 0.0], 3.0, 1.0).expect("valid disc");
-        let filter = Filter::builder(4, 2)
-            .barrier("goal", PointMass, goal, BarrierSettings::within(deadline))
-            .and_then(|b| b.barrier("way", PointMass, self.clone(), BarrierSettings::keeping()))
+        let filter = Filter::builder(PointMass)
+            .barrier("goal", goal, BarrierSettings::within(deadline))
+            .and_then(|b| b.barrier("way", self.clone(), BarrierSettings::keeping()))
             .and_then(|b| b.bounds(&[-4.0; 2], &[4.0; 2]))
             .and_then(|b| b.sampling(Sampling::Period(0.05)))
             .and_then(FilterBuilder::build)
@@ -2283,8 +2279,8 @@ fn a_wind_on_a_short_stretch_is_seen_wherever_it_blows() {
         let plant = Windy([random.between(60.0, 500.0), width, random.between(1.0, 60.0) / width]);
         let goal = StateBound::at_least(0, 550.0).expect("valid bound");
         let deadline = random.between(40.0, 60.0);
-        let filter = Filter::builder(2, 1)
-            .barrier("goal", plant, goal, BarrierSettings::within(deadline))
+        let filter = Filter::builder(plant)
+            .barrier("goal", goal, BarrierSettings::within(deadline))
             .and_then(|b| b.bounds(&[-0.5], &[0.5]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
@@ -2342,8 +2338,8 @@ fn jumps_and_powers_of_negative_numbers_are_seen() {
         let exponent = [2.0, 4.0, 6.0, 66.0][round % 4];
         let (odd, edge) = if round < 16 { (Odd::Angle, 0.0) } else { (Odd::Power(exponent), -5.0) };
         let plant = Windy([0.0, 1.0, 0.0]);
-        let filter = Filter::builder(2, 1)
-            .barrier("odd", plant, odd, BarrierSettings::keeping())
+        let filter = Filter::builder(plant)
+            .barrier("odd", odd, BarrierSettings::keeping())
             .and_then(|b| b.bounds(&[-1.0], &[1.0]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
@@ -2397,9 +2393,13 @@ fn small_things_are_seen_far_from_the_origin() {
         let plant = Lifted(far + 1.2345);
         let ceiling = StateBound::at_most(1, far + 0.003).expect("valid bound");
         let goal = StateBound::at_least(0, far + 2.5).expect("valid bound");
-        let filter = Filter::builder(2, 2)
-            .source("ceiling", along(plant, ceiling, 1).expect("a degree"), BarrierSettings::keeping())
-            .and_then(|b| b.barrier("goal", plant, goal, BarrierSettings::within(4.0)))
+        let filter = Filter::builder(plant)
+            .source(
+                "ceiling",
+                along(Arc::new(plant), ceiling, 1).expect("a degree"),
+                BarrierSettings::keeping(),
+            )
+            .and_then(|b| b.barrier("goal", goal, BarrierSettings::within(4.0)))
             .and_then(|b| b.bounds(&[-1.0, -0.01], &[1.0, 0.01]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
@@ -2436,8 +2436,8 @@ fn a_deadline_beside_a_sample_is_looked_at() {
         let deadline = 2.0 + 1e-6 * PERIOD + beside;
         // From rest 20 m are all that 10 m/s² allow until then.
         let goal = StateBound::at_least(0, 20.5).expect("valid bound");
-        let filter = Filter::builder(4, 2)
-            .barrier("goal", PointMass, goal, BarrierSettings::within(deadline))
+        let filter = Filter::builder(PointMass)
+            .barrier("goal", goal, BarrierSettings::within(deadline))
             .and_then(|b| b.bounds(&[-10.0; 2], &[10.0; 2]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))
             .and_then(FilterBuilder::build)
@@ -2458,10 +2458,10 @@ fn a_deadline_beside_a_sample_is_looked_at() {
 fn what_has_ended_is_not_guaranteed() {
     let fence = StateBound::at_most(0, 5.0).expect("valid bound");
     let goal = StateBound::at_least(0, 9.0).expect("valid bound");
-    let filter = Filter::builder(4, 2)
-        .barrier("fence", PointMass, fence, BarrierSettings::keeping())
+    let filter = Filter::builder(PointMass)
+        .barrier("fence", fence, BarrierSettings::keeping())
         .and_then(|b| b.window(Begin::AtOnce, End::At(3.0)))
-        .and_then(|b| b.barrier("goal", PointMass, goal, BarrierSettings::within(3.9)))
+        .and_then(|b| b.barrier("goal", goal, BarrierSettings::within(3.9)))
         .and_then(|b| b.bounds(&[-6.0; 2], &[6.0; 2]))
         .and_then(|b| b.sampling(Sampling::Period(0.1)))
         .and_then(FilterBuilder::build)
@@ -2486,8 +2486,8 @@ fn what_has_ended_is_not_guaranteed() {
 fn armed_again_when_all_is_over_it_follows_no_plan() {
     for (samples, driver) in [(5, Driver::Plan), (12, Driver::Rows)] {
         let fence = StateBound::at_most(0, 5.0).expect("valid bound");
-        let filter = Filter::builder(4, 2)
-            .barrier("fence", PointMass, fence, BarrierSettings::keeping())
+        let filter = Filter::builder(PointMass)
+            .barrier("fence", fence, BarrierSettings::keeping())
             .and_then(|b| b.window(Begin::AtOnce, End::At(1.0)))
             .and_then(|b| b.bounds(&[-6.0; 2], &[6.0; 2]))
             .and_then(|b| b.sampling(Sampling::Period(0.1)))
@@ -2525,11 +2525,11 @@ impl ControlAffine<2, 1> for Filling {
 /// Keeps the level of `plant`, its second state, below `limit`.
 fn level_kept<P, const NX: usize>(plant: P, limit: f64) -> Filter
 where
-    P: ControlAffine<NX, 1> + Send + 'static,
+    P: ControlAffine<NX, 1> + Send + Sync + 'static,
 {
     let level = StateBound::at_most(1, limit).expect("valid bound");
-    let source = along(plant, level, 2).expect("a degree");
-    let filter = Filter::builder(NX, 1)
+    let source = along(Arc::new(plant), level, 2).expect("a degree");
+    let filter = Filter::from_sources(NX, 1)
         .source("level", source, BarrierSettings::keeping())
         .and_then(|b| b.bounds(&[-2.0], &[2.0]))
         .and_then(|b| b.sampling(Sampling::Period(0.1)))
@@ -2701,8 +2701,8 @@ fn an_unstable_equilibrium_does_not_count() {
         let leads_out = round % 3 > 0;
         let rate = 10.0_f64.powf(random.between(-3.0, 0.5)) * if leads_out { 1.0 } else { -1.0 };
         let plant = Unstable { rate };
-        let filter = Filter::builder(4, 1)
-            .barrier("near", plant, Near, BarrierSettings::within(8.0))
+        let filter = Filter::builder(plant)
+            .barrier("near", Near, BarrierSettings::within(8.0))
             .and_then(|b| b.bounds(&[-2.0], &[2.0]))
             .and_then(|b| b.sampling(Sampling::Period(0.05)))
             .and_then(FilterBuilder::build)
@@ -2756,8 +2756,8 @@ fn what_round_off_would_lose_is_not_followed() {
         let (stiffness, most) = (random.between(20.0, 40.0), random.between(1.0, 3.0));
         let brink = most / stiffness;
         let set = Within(brink * random.between(1.2, 2.0));
-        let filter = Filter::builder(2, 1)
-            .barrier("near", Driven { stiffness }, set, BarrierSettings::keeping())
+        let filter = Filter::builder(Driven { stiffness })
+            .barrier("near", set, BarrierSettings::keeping())
             .and_then(|b| b.bounds(&[-most], &[most]))
             .and_then(|b| b.sampling(Sampling::Period(STEP)))
             .and_then(FilterBuilder::build)
@@ -2807,8 +2807,8 @@ fn a_lag_far_shorter_than_a_hold_is_promised() {
         let step = random.between(0.01, 0.2);
         let lag = step / 10.0_f64.powf(random.between(-0.5, 2.0));
         let (set, most) = (Within(random.between(0.5, 1.5)), random.between(1.0, 3.0));
-        let filter = Filter::builder(2, 1)
-            .barrier("near", Lagging { lag }, set, BarrierSettings::within(3.0))
+        let filter = Filter::builder(Lagging { lag })
+            .barrier("near", set, BarrierSettings::within(3.0))
             .and_then(|b| b.bounds(&[-most], &[most]))
             .and_then(|b| b.sampling(Sampling::Period(step)))
             .and_then(FilterBuilder::build)
@@ -2883,8 +2883,8 @@ fn what_creeps_on_unseen_is_no_equilibrium() {
         if !leads_out && plant.towards > lost - 0.1 {
             continue;
         }
-        let filter = Filter::builder(3, 1)
-            .barrier("cool", plant, cool, BarrierSettings::within(8.0))
+        let filter = Filter::builder(plant)
+            .barrier("cool", cool, BarrierSettings::within(8.0))
             .and_then(|b| b.bounds(&[-2.0], &[2.0]))
             .and_then(|b| b.sampling(Sampling::Period(0.05)))
             .and_then(FilterBuilder::build)

@@ -3,6 +3,8 @@
 
 mod draw;
 
+use std::sync::Arc;
+
 use std::array::from_fn;
 
 use punctual_core::barriers::{DistanceDisc, HalfPlane, Rectangle};
@@ -48,10 +50,10 @@ fn bounds(limit: f64) -> Bounds {
 
 fn earliest<P, B, const NX: usize>(plant: P, barrier: B, n: usize, x: [f64; NX], limit: f64) -> f64
 where
-    P: ControlAffine<NX, 2> + Send + 'static,
+    P: ControlAffine<NX, 2> + Send + Sync + 'static,
     B: Barrier<NX> + Send + 'static,
 {
-    let source = lie::along(plant, barrier, n).expect("valid");
+    let source = lie::along(Arc::new(plant), barrier, n).expect("valid");
     reach::earliest_arrival(&*source, (0.0, &x), &bounds(limit), 1e3).expect("known")
 }
 
@@ -76,14 +78,14 @@ fn the_earliest_times_of_chains_are_the_known_ones() {
     let coming = disc.moving([-3.0, 0.0]).expect("valid");
     close(earliest(PointMass, coming, 2, [0.0; 4], 4.0), (-3.0 + (9.0_f64 + 64.0).sqrt()) / 4.0);
     // Nothing known without bounds.
-    let source = lie::along(PointMass, disc, 2).expect("valid");
+    let source = lie::along(Arc::new(PointMass), disc, 2).expect("valid");
     assert_eq!(reach::earliest_arrival(&*source, (0.0, &[0.0; 4]), &Bounds::NONE, 1.0), None);
 }
 
 /// Inputs drawn within the bounds, held for random times: none arrives before the bound.
 fn never_earlier<P, const NX: usize>(plant: P, limits: [f64; 2], seed: u64)
 where
-    P: ControlAffine<NX, 2> + Copy + Send + 'static,
+    P: ControlAffine<NX, 2> + Copy + Send + Sync + 'static,
 {
     let mut draw = draw::Draw::new(seed);
     for _ in 0..40 {
@@ -91,7 +93,7 @@ where
         let disc = DistanceDisc::new([draw.uniform(-9.0, 9.0), 3.0], 2.0, 2.0)
             .and_then(|d| d.moving([draw.uniform(-1.0, 1.0), 0.5]))
             .expect("valid");
-        let source = lie::along(plant, disc, 2).expect("valid");
+        let source = lie::along(Arc::new(plant), disc, 2).expect("valid");
         let mut within = Bounds::NONE;
         for i in 0..2 {
             (within.min[i], within.max[i]) = (-limits[i], limits[i]);
@@ -127,8 +129,8 @@ fn no_bounded_run_arrives_before_the_earliest_time() {
 
 fn filter(settings: BarrierSettings, limit: f64) -> Filter {
     let half = HalfPlane::new([1.0, 0.0], [9.0, 0.0]).expect("valid");
-    Filter::builder(4, 2)
-        .barrier("goal", PointMass, half, settings)
+    Filter::builder(PointMass)
+        .barrier("goal", half, settings)
         .and_then(|b| b.bounds(&[-limit; 2], &[limit; 2]))
         .and_then(FilterBuilder::build)
         .expect("valid filter")
@@ -226,8 +228,8 @@ fn what_a_disturbance_may_do_is_not_ruled_out() {
     for disturbance in [0.0, 60.0] {
         let settings = BarrierSettings { disturbance, ..BarrierSettings::within(1.0) };
         let line = HalfPlane::new([1.0, 0.0], [20.0, 0.0]).expect("a valid barrier");
-        let mut filter = Filter::builder(4, 2)
-            .barrier("line", PointMass, line, settings)
+        let mut filter = Filter::builder(PointMass)
+            .barrier("line", line, settings)
             .and_then(|b| b.bounds(&[-4.0; 2], &[4.0; 2]))
             .and_then(FilterBuilder::build)
             .expect("a valid filter");

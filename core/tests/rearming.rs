@@ -3,6 +3,8 @@
 
 mod scenario;
 
+use std::sync::Arc;
+
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::convergence::{FixedTime, FixedTimeState};
 use punctual_core::dynamics::rk4_step;
@@ -106,8 +108,10 @@ fn a_deadline_in_the_past_is_late_at_once() {
 /// A deadline shorter than a step: the sampled constraint has its end beyond the deadline, so that the
 /// barrier arrives at the first sample after it, whatever its relative degree, and stays.
 fn short_deadline<const N: usize>(step: f64, deadline: f64) {
-    let mut filter = lie::along(Integrator::<N>, NonNegative, N)
-        .and_then(|source| Filter::builder(N, 1).source("line", source, BarrierSettings::within(deadline)))
+    let mut filter = lie::along(Arc::new(Integrator::<N>), NonNegative, N)
+        .and_then(|source| {
+            Filter::from_sources(N, 1).source("line", source, BarrierSettings::within(deadline))
+        })
         .and_then(|b| b.sampling(Sampling::Period(step)))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
@@ -150,8 +154,8 @@ fn a_deadline_shorter_than_a_step_is_met_as_soon_as_samples_allow() {
 #[test]
 fn a_start_inside() {
     for (x0, at_once) in [([1.0, -1.0], true), ([1.0, -40.0], false)] {
-        let mut filter = Filter::builder(2, 1)
-            .barrier("line", Integrator::<2>, NonNegative, BarrierSettings::within(4.0))
+        let mut filter = Filter::builder(Integrator::<2>)
+            .barrier("line", NonNegative, BarrierSettings::within(4.0))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
         let schedule = Schedule { step: 0.01, steps: 1200, substeps: 1 };
@@ -217,7 +221,7 @@ fn a_moved_set_on_the_way() {
         let t = f64::from(k) * step;
         if (t - moved_at).abs() < 1e-9 {
             let disc = DistanceDisc::new([20.0, 60.0], 2.0, 2.0).expect("valid disc");
-            let source = lie::along(punctual_core::plants::PointMass, disc, 2).expect("in range");
+            let source = lie::along(Arc::new(punctual_core::plants::PointMass), disc, 2).expect("in range");
             filter.set_source(0, source).expect("the same dimensions");
         }
         let u_ref = [-x[2], -x[3]];
@@ -227,10 +231,10 @@ fn a_moved_set_on_the_way() {
         assert!(!promised || b.h >= 0.0, "h = {} at {t}", b.h);
         x = rk4_step(&punctual_core::plants::PointMass, &x, &u, step);
     }
-    let other = lie::along(Integrator::<2>, NonNegative, 2).expect("in range");
+    let other = lie::along(Arc::new(Integrator::<2>), NonNegative, 2).expect("in range");
     let refused = filter.set_source(0, other).expect_err("refused");
     assert_eq!(refused.to_string(), "goal.x: has 2 components, must have 4");
-    let other = lie::along(punctual_core::plants::PointMass, distance_disc(), 1).expect("in range");
+    let other = lie::along(Arc::new(punctual_core::plants::PointMass), distance_disc(), 1).expect("in range");
     let refused = filter.set_source(0, other).expect_err("refused");
     assert_eq!(refused.to_string(), "goal.relative_degree: is 1, must stay 2");
 }
@@ -239,8 +243,8 @@ fn a_moved_set_on_the_way() {
 #[test]
 fn a_method_that_fails_at_the_anchor_is_reported() {
     let settings = BarrierSettings { method: Method::RepeatedRoot, ..BarrierSettings::within(4.0) };
-    let mut filter = Filter::builder(3, 1)
-        .barrier("line", Integrator::<3>, NonNegative, settings)
+    let mut filter = Filter::builder(Integrator::<3>)
+        .barrier("line", NonNegative, settings)
         .and_then(FilterBuilder::build)
         .expect("valid filter");
     assert_eq!(filter.refusal(0), None);
@@ -261,8 +265,8 @@ fn jacobi(step: f64, x0: [f64; 4]) -> (Option<f64>, f64, usize) {
         margin: 0.02,
         ..BarrierSettings::within(5.0)
     };
-    let mut filter = Filter::builder(4, 2)
-        .barrier("goal", Unicycle, distance_disc(), settings)
+    let mut filter = Filter::builder(Unicycle)
+        .barrier("goal", distance_disc(), settings)
         .and_then(|b| b.sampling(Sampling::Period(step)))
         .and_then(|b| b.actuation_delay(step))
         .and_then(FilterBuilder::build)
@@ -303,10 +307,10 @@ fn a_delay_of_one_step_is_compensated() {
 /// h is of now, the rest of the time at which the input acts; the deadline counts from the first sample.
 #[test]
 fn a_delayed_report_names_its_times() {
-    let mut filter = Filter::builder(2, 1)
+    let mut filter = Filter::from_sources(2, 1)
         .source(
             "line",
-            lie::along(Integrator::<2>, NonNegative, 2).expect("in range"),
+            lie::along(Arc::new(Integrator::<2>), NonNegative, 2).expect("in range"),
             BarrierSettings::within(4.0),
         )
         .and_then(|b| b.actuation_delay(0.5))
@@ -323,14 +327,14 @@ fn a_delayed_report_names_its_times() {
 
 #[test]
 fn a_delay_is_checked() {
-    let builder = || Filter::builder(4, 2);
+    let builder = || Filter::builder(Unicycle);
     let settings = BarrierSettings::within(4.0);
     for value in [-0.1, f64::NAN, f64::INFINITY] {
         let refused = builder().actuation_delay(value).err().expect("refused");
         assert_eq!(refused.to_string(), format!("actuation_delay: is {value}, must be finite and >= 0"));
     }
     let refused = builder()
-        .barrier("goal", Unicycle, distance_disc(), settings)
+        .barrier("goal", distance_disc(), settings)
         .and_then(|b| b.sampling(Sampling::Period(0.01)))
         .and_then(|b| b.actuation_delay(0.02))
         .and_then(FilterBuilder::build)

@@ -3,6 +3,8 @@
 mod scenario;
 mod support;
 
+use std::sync::Arc;
+
 use proptest::prelude::*;
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, Outside, StateBound};
@@ -34,10 +36,10 @@ fn settings() -> BarrierSettings {
 
 fn filter<P>(plant: P, sampling: Sampling) -> Filter
 where
-    P: ControlAffine<4, 2> + Send + 'static,
+    P: ControlAffine<4, 2> + Send + Sync + 'static,
 {
-    Filter::builder(4, 2)
-        .barrier("goal", plant, distance_disc(), settings())
+    Filter::builder(plant)
+        .barrier("goal", distance_disc(), settings())
         .and_then(|b| b.sampling(sampling))
         .and_then(FilterBuilder::build)
         .expect("valid filter")
@@ -46,7 +48,7 @@ where
 /// Prediction against many small Runge-Kutta steps, its gradient against central differences.
 #[test]
 fn predictions_follow_the_flow() {
-    let source = lie::along(bicycle(), distance_disc(), 2).expect("in range");
+    let source = lie::along(Arc::new(bicycle()), distance_disc(), 2).expect("in range");
     let model = source.predict().expect("a model");
     let (x, u, period) = ([10.0, 20.0, 0.4, 6.0], [3.0, -0.7], 0.05);
     let mut ahead = Ahead::ZERO;
@@ -105,10 +107,10 @@ fn predicted<P, const NX: usize, const NU: usize>(
     duration: f64,
 ) -> f64
 where
-    P: ControlAffine<NX, NU> + Send + 'static,
+    P: ControlAffine<NX, NU> + Send + Sync + 'static,
 {
     let wall = StateBound::at_most(0, 0.0).expect("a bound");
-    let source = lie::along(plant, wall, n).expect("in range");
+    let source = lie::along(Arc::new(plant), wall, n).expect("in range");
     let mut ahead = Ahead::ZERO;
     source.predict().expect("a model").ahead(0.0, &x, &u, duration, &mut ahead);
     -ahead.value[0]
@@ -148,8 +150,8 @@ fn psi_never_falls_faster<const N: usize>(period: f64) {
         margin: 0.05,
         ..BarrierSettings::within(4.0)
     };
-    let mut filter = lie::along(Integrator::<N>, NonNegative, N)
-        .and_then(|source| Filter::builder(N, 1).source("line", source, settings))
+    let mut filter = lie::along(Arc::new(Integrator::<N>), NonNegative, N)
+        .and_then(|source| Filter::from_sources(N, 1).source("line", source, settings))
         .and_then(|b| b.sampling(Sampling::Period(period)))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
@@ -208,7 +210,7 @@ fn run<P>(
     x0: [f64; 4],
 ) -> (Option<f64>, f64)
 where
-    P: ControlAffine<4, 2> + Clone + Send + 'static,
+    P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
 {
     let mut filter = filter(plant.clone(), sampling);
     let (mut arrival, mut least) = (None, f64::INFINITY);
@@ -317,7 +319,7 @@ fn the_period_is_measured() {
 #[test]
 fn a_period_must_be_positive() {
     for value in [0.0, -0.01, f64::NAN, f64::INFINITY] {
-        let refused = Filter::builder(4, 2).sampling(Sampling::Period(value)).err().expect("refused");
+        let refused = Filter::from_sources(4, 2).sampling(Sampling::Period(value)).err().expect("refused");
         assert_eq!(refused.to_string(), format!("sampling_period: is {value}, must be finite and > 0"));
     }
 }
@@ -325,8 +327,8 @@ fn a_period_must_be_positive() {
 /// Without a model the constraint is pointwise, to the bit, and the report says so.
 #[test]
 fn without_a_prediction_the_constraint_is_pointwise() {
-    let blind = Reduced::blind(lie::along(PointMass, distance_disc(), 2).expect("in range"));
-    let mut blind = Filter::builder(4, 2)
+    let blind = Reduced::blind(lie::along(Arc::new(PointMass), distance_disc(), 2).expect("in range"));
+    let mut blind = Filter::from_sources(4, 2)
         .source("goal", Box::new(blind), settings())
         .and_then(|b| b.sampling(Sampling::Period(0.05)))
         .and_then(FilterBuilder::build)
@@ -335,8 +337,8 @@ fn without_a_prediction_the_constraint_is_pointwise() {
     let margin =
         blind.peek(0.0, &first, &[0.0; 2], &mut [0.0; 2]).expect("right dimensions").barriers[0].margin;
     assert!(margin > settings().margin);
-    let mut pointwise = Filter::builder(4, 2)
-        .barrier("goal", PointMass, distance_disc(), BarrierSettings { margin, ..settings() })
+    let mut pointwise = Filter::builder(PointMass)
+        .barrier("goal", distance_disc(), BarrierSettings { margin, ..settings() })
         .and_then(|b| b.sampling(Sampling::Pointwise))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
@@ -411,8 +413,8 @@ proptest! {
     ) {
         let high = if bounded { [60.0, 20.0] } else { [f64::INFINITY; 2] };
         let sampling = if measured { Sampling::Measured { first: None } } else { Sampling::Period(0.05) };
-        let mut filter = Filter::builder(4, 2)
-            .barrier("goal", Unicycle, distance_disc(), settings())
+        let mut filter = Filter::builder(Unicycle)
+            .barrier("goal", distance_disc(), settings())
             .and_then(|b| b.bounds(&high.map(|v| -v), &high))
             .and_then(|b| b.sampling(sampling))
             .and_then(FilterBuilder::build)
@@ -434,9 +436,9 @@ fn every_answer_is_optimal() {
     const SEARCH: f64 = 1e-8;
     for (sampling, tolerance) in [(Sampling::Pointwise, 1e-13), (Sampling::Period(0.01), SEARCH)] {
         let obstacle = Outside(DistanceDisc::new([24.0, 23.0], 4.0, 4.0).expect("valid disc"));
-        let mut filter = Filter::builder(4, 2)
-            .barrier("goal", PointMass, distance_disc(), settings())
-            .and_then(|b| b.barrier("obstacle", PointMass, obstacle, settings()))
+        let mut filter = Filter::builder(PointMass)
+            .barrier("goal", distance_disc(), settings())
+            .and_then(|b| b.barrier("obstacle", obstacle, settings()))
             .and_then(|b| b.bounds(&[-60.0; 2], &[60.0; 2])?.sampling(sampling))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
@@ -475,8 +477,8 @@ fn what_is_on_course_stands_a_disturbance_between_samples() {
             margin: 0.05 * part(11),
             ..BarrierSettings::within(deadline)
         };
-        let mut filter = Filter::builder(1, 1)
-            .barrier("goal", Integrator::<1>, NonNegative, settings)
+        let mut filter = Filter::builder(Integrator::<1>)
+            .barrier("goal", NonNegative, settings)
             .and_then(|b| b.sampling(Sampling::Period(period)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
@@ -519,7 +521,7 @@ fn ditches_crossed<const N: usize>(source: impl Fn(Ditch) -> Box<dyn DerivativeS
         let (period, speed) = (0.01 + 0.09 * part(31), 4.0 + 16.0 * part(45));
         let at = 20.0 * period * speed + 3.0 * part(59);
         let width = period * speed * 0.05 * powf(0.02, part(71));
-        let mut filter = Filter::builder(N, 1)
+        let mut filter = Filter::from_sources(N, 1)
             .source("ditch", source(Ditch { at, width }), BarrierSettings::keeping())
             .and_then(|b| b.sampling(Sampling::Period(period)))
             .and_then(FilterBuilder::build)
@@ -544,11 +546,11 @@ fn ditches_crossed<const N: usize>(source: impl Fn(Ditch) -> Box<dyn DerivativeS
 
 #[test]
 fn what_is_on_course_crosses_nothing_narrow() {
-    let along = |ditch| lie::along(Integrator::<2>, ditch, 2).expect("in range");
+    let along = |ditch| lie::along(Arc::new(Integrator::<2>), ditch, 2).expect("in range");
     let [on_course, crossed, samples] = ditches_crossed::<2>(along);
     // One sample in a hundred or so is at a ditch.
     assert!(crossed > 60 && on_course * 100 > 95 * samples, "{on_course} {crossed} {samples}");
-    let along = |ditch| lie::along(Integrator::<1>, ditch, 1).expect("in range");
+    let along = |ditch| lie::along(Arc::new(Integrator::<1>), ditch, 1).expect("in range");
     let [on_course, crossed, samples] = ditches_crossed::<1>(along);
     assert!(on_course * 100 > 95 * samples, "{on_course} {crossed} {samples}");
 }
@@ -584,8 +586,8 @@ fn what_is_on_course_is_not_blown_into_a_wall() {
         let gust = Gust { strength: 10.0 * part(97) * speed * speed / width, at, width };
         let wall = way * (1.1 + 3.0 * part(313));
         let plant = Gust { ..gust };
-        let mut filter = Filter::builder(2, 1)
-            .barrier("wall", gust, StateBound::at_most(0, wall).expect("valid"), BarrierSettings::keeping())
+        let mut filter = Filter::builder(gust)
+            .barrier("wall", StateBound::at_most(0, wall).expect("valid"), BarrierSettings::keeping())
             .and_then(|b| b.sampling(Sampling::Period(period)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
@@ -645,8 +647,8 @@ fn what_a_gust_leaves_at_the_end_of_a_hold_is_looked_at() {
         let (hold, h, speed) = (0.02 + 0.5 * part(29), 0.1 + 3.0 * part(131), part(57) - 0.5);
         let gust = Gusty { strength: 20.0 * part(211) * h / (hold * hold), hold };
         let strength = gust.strength;
-        let mut filter = Filter::builder(3, 1)
-            .barrier("wall", gust, Wall, BarrierSettings::keeping())
+        let mut filter = Filter::builder(gust)
+            .barrier("wall", Wall, BarrierSettings::keeping())
             .and_then(|b| b.sampling(Sampling::Period(hold)))
             .and_then(FilterBuilder::build)
             .expect("valid filter");

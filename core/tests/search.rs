@@ -8,6 +8,8 @@
 
 #![allow(clippy::print_stdout, reason = "it prints tables")]
 
+use std::sync::Arc;
+
 use std::time::Instant;
 
 use punctual_core::barrier::Barrier;
@@ -230,15 +232,15 @@ type Built = (Filter, Vec<(FixedTime, Box<dyn DerivativeSource>)>);
 
 fn build<P>(plant: P, sets: &[(Set, BarrierSettings)], bound: Option<[f64; 2]>, period: f64) -> Built
 where
-    P: ControlAffine<4, 2> + Copy + Send + 'static,
+    P: ControlAffine<4, 2> + Copy + Send + Sync + 'static,
 {
-    let mut builder = Filter::builder(4, 2).sampling(Sampling::Period(period)).expect("valid period");
+    let mut builder = Filter::builder(plant).sampling(Sampling::Period(period)).expect("valid period");
     let mut promises: Vec<(FixedTime, Box<dyn DerivativeSource>)> = Vec::new();
     for (i, (set, settings)) in sets.iter().enumerate() {
-        builder = builder.barrier(&format!("set {i}"), plant, *set, *settings).expect("valid barrier");
+        builder = builder.barrier(&format!("set {i}"), *set, *settings).expect("valid barrier");
         promises.push((
             FixedTime::new(2, *settings).expect("valid promise"),
-            lie::along(plant, *set, 2).expect("in range"),
+            lie::along(Arc::new(plant), *set, 2).expect("in range"),
         ));
     }
     if let Some(b) = bound {
@@ -282,7 +284,7 @@ fn run<P>(
     tally: &mut Tally,
     name: &str,
 ) where
-    P: ControlAffine<4, 2> + Copy + Send + 'static,
+    P: ControlAffine<4, 2> + Copy + Send + Sync + 'static,
 {
     let bound = match kind {
         0 => None,
@@ -409,8 +411,8 @@ fn round_off_at_the_boundary_is_no_violation() {
     for period in [0.001, 0.003, 0.01, 0.03, 0.1] {
         for (margin, start) in [(0.0, 0.0), (0.0, 9.0), (0.02, 3.3)] {
             let settings = BarrierSettings { margin, ..BarrierSettings::within(2.0) };
-            let mut filter = Filter::builder(1, 1)
-                .barrier("line", Line, Below, settings)
+            let mut filter = Filter::builder(Line)
+                .barrier("line", Below, settings)
                 .and_then(|b| b.sampling(Sampling::Period(period)))
                 .and_then(FilterBuilder::build)
                 .expect("valid filter");
@@ -493,8 +495,8 @@ fn a_step_taken_again_gives_the_same_input() {
         }
         let disc = DistanceDisc::new(centre, 2.0, 2.0).expect("valid disc");
         let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(random.between(3.0, 12.0)) };
-        let mut filter = Filter::builder(4, 2)
-            .barrier("goal", Unicycle, disc, settings)
+        let mut filter = Filter::builder(Unicycle)
+            .barrier("goal", disc, settings)
             .and_then(|b| b.sampling(Sampling::Measured { first: Some(STEP) }))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
@@ -533,7 +535,7 @@ fn a_kept_curvature_only_shortens_the_search() {
     const SAME: f64 = 1e-8;
     fn run<P>(plant: P, seed: u64) -> [usize; 3]
     where
-        P: ControlAffine<4, 2> + Copy + Send + 'static,
+        P: ControlAffine<4, 2> + Copy + Send + Sync + 'static,
     {
         let (mut samples, mut kept, mut repeated) = (0, 0, 0);
         let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));

@@ -129,42 +129,43 @@ fn goal() -> DistanceDisc {
 /// A goal, an obstacle on the way and a speed limit, with bounds.
 fn vehicle<P>(plant: P, speed: StateBound, form: Form) -> Filter
 where
-    P: ControlAffine<4, 2> + Copy + Send + 'static,
+    P: ControlAffine<4, 2> + Copy + Send + Sync + 'static,
 {
     let obstacle = Outside(DistanceDisc::new([6.0, 3.0], 1.0, 0.5).expect("valid disc"));
-    let builder = Filter::builder(4, 2)
-        .barrier("goal", plant, goal(), BarrierSettings::within(5.0))
-        .and_then(|b| b.barrier("clear", plant, obstacle, BarrierSettings::within(2.0)))
-        .and_then(|b| b.barrier("speed", plant, speed, BarrierSettings::within(1.0)))
+    let builder = Filter::builder(plant)
+        .barrier("goal", goal(), BarrierSettings::within(5.0))
+        .and_then(|b| b.barrier("clear", obstacle, BarrierSettings::within(2.0)))
+        .and_then(|b| b.barrier("speed", speed, BarrierSettings::within(1.0)))
         .and_then(|b| b.bounds(&[-6.0, -2.0], &[6.0, 2.0]))
         .expect("valid barriers");
-    formed(builder, form)
+    formed(builder.erased(), form)
 }
 
 /// A goal and a wall, for the bicycles that have their steering as a state.
 fn walled<P>(plant: P, form: Form) -> Filter
 where
-    P: ControlAffine<5, 2> + Copy + Send + 'static,
+    P: ControlAffine<5, 2> + Copy + Send + Sync + 'static,
 {
     let wall = HalfPlane::new([-1.0, 0.2], [14.0, 0.0]).expect("valid half-plane");
-    let builder = Filter::builder(5, 2)
-        .barrier("goal", plant, goal(), BarrierSettings::within(5.0))
-        .and_then(|b| b.barrier("wall", plant, wall, BarrierSettings::within(2.0)))
+    let builder = Filter::builder(plant)
+        .barrier("goal", goal(), BarrierSettings::within(5.0))
+        .and_then(|b| b.barrier("wall", wall, BarrierSettings::within(2.0)))
         .and_then(|b| b.bounds(&[-6.0, -4.0], &[6.0, 4.0]))
         .expect("valid barriers");
-    formed(builder, form)
+    formed(builder.erased(), form)
 }
 
 /// One barrier by each method, without bounds; `RepeatedRoot` and profiles start from the anchor.
 fn by_method(settings: BarrierSettings, form: Form) -> Filter {
-    let builder = Filter::builder(4, 2).barrier("goal", Unicycle, goal(), settings).expect("valid barrier");
-    formed(builder, form)
+    let builder = Filter::builder(Unicycle).barrier("goal", goal(), settings).expect("valid barrier");
+    formed(builder.erased(), form)
 }
 
 /// The filters that are tried, by number; the number of states and what u_ref is about.
 fn filters(which: usize, form: Form) -> (Filter, usize) {
     let speed = || StateBound::at_most(3, 4.0).expect("valid bound");
-    let soft = |b: FilterBuilder| b.strictness(Strictness::Soft(1.5)).expect("valid strictness");
+    let soft =
+        |b: FilterBuilder<PointMass, 4, 2>| b.strictness(Strictness::Soft(1.5)).expect("valid strictness");
     match which {
         0 => (vehicle(PointMass, speed(), form), 4),
         1 => (vehicle(Unicycle, speed(), form), 4),
@@ -173,25 +174,18 @@ fn filters(which: usize, form: Form) -> (Filter, usize) {
         4 => (walled(SmallSlipBicycle::new(2.0).expect("valid").with_rate(), form), 5),
         5 => {
             let follow = Outside(goal().following(4));
-            let builder = Filter::builder(8, 2)
-                .barrier::<_, _, 8, 2>(
-                    "clear",
-                    WithPoint::<_, 4>(Unicycle),
-                    follow,
-                    BarrierSettings::within(3.0),
-                )
+            let builder = Filter::builder::<_, 8, 2>(WithPoint::<_, 4>(Unicycle))
+                .barrier("clear", follow, BarrierSettings::within(3.0))
                 .expect("valid barrier");
-            (formed(builder, form), 8)
+            (formed(builder.erased(), form), 8)
         }
         6 => {
-            let builder = Filter::builder(4, 2)
-                .barrier("goal", PointMass, goal(), BarrierSettings::within(5.0))
+            let builder = Filter::builder(PointMass)
+                .barrier("goal", goal(), BarrierSettings::within(5.0))
                 .map(soft)
-                .and_then(|b| {
-                    b.barrier("speed", PointMass, NormBound::new(2, 3.0)?, BarrierSettings::within(1.0))
-                })
+                .and_then(|b| b.barrier("speed", NormBound::new(2, 3.0)?, BarrierSettings::within(1.0)))
                 .expect("valid barriers");
-            (formed(builder, form), 4)
+            (formed(builder.erased(), form), 4)
         }
         7 => {
             // Its rate changes with the anchor, and so does what a disturbance asks for over a period.
@@ -210,23 +204,17 @@ fn filters(which: usize, form: Form) -> (Filter, usize) {
             4,
         ),
         9 => {
-            let builder = Filter::builder(4, 2)
-                .barrier(
-                    "speed",
-                    PointMass,
-                    NormBound::new(2, 1.5).expect("valid"),
-                    BarrierSettings::within(2.0),
-                )
+            let builder = Filter::builder(PointMass)
+                .barrier("speed", NormBound::new(2, 1.5).expect("valid"), BarrierSettings::within(2.0))
                 .expect("valid barrier");
-            (formed(builder, form), 4)
+            (formed(builder.erased(), form), 4)
         }
         10 => {
             let quadratic = QuadraticDisc::new([12.0, 4.0], 2.0).expect("valid disc");
             let settings =
                 BarrierSettings { margin: 0.3, recovery: Some(2.0), ..BarrierSettings::within(5.0) };
-            let builder =
-                Filter::builder(4, 2).barrier("goal", Unicycle, quadratic, settings).expect("valid");
-            (formed(builder, form), 4)
+            let builder = Filter::builder(Unicycle).barrier("goal", quadratic, settings).expect("valid");
+            (formed(builder.erased(), form), 4)
         }
         _ => unreachable!("eleven filters"),
     }
@@ -330,7 +318,7 @@ impl DerivativeSource for Mute {
 
 #[test]
 fn what_is_not_known_is_said() {
-    let mut filter = Filter::builder(1, 1)
+    let mut filter = Filter::from_sources(1, 1)
         .source("mute", Box::new(Mute), BarrierSettings::within(1.0))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
@@ -354,13 +342,8 @@ fn what_is_not_known_is_said() {
 #[test]
 fn a_later_deadline_is_held() {
     let with = |deadline: f64, infeasible| {
-        Filter::builder(4, 2)
-            .barrier(
-                "goal",
-                PointMass,
-                goal(),
-                BarrierSettings { infeasible, ..BarrierSettings::within(deadline) },
-            )
+        Filter::builder(PointMass)
+            .barrier("goal", goal(), BarrierSettings { infeasible, ..BarrierSettings::within(deadline) })
             .and_then(|b| b.bounds(&[-1.0; 2], &[1.0; 2])?.sampling(Sampling::Period(0.01)))
             .and_then(FilterBuilder::build)
             .expect("valid filter")

@@ -31,9 +31,9 @@ fn back<T: DeserializeOwned>(text: &str) -> T {
 
 /// A goal with a deadline, and a set without one: its deadline is infinite.
 fn filter() -> Filter {
-    Filter::builder(4, 2)
-        .barrier("goal", Unicycle, distance_disc(), BarrierSettings::within(12.0))
-        .and_then(|b| b.barrier("room", Unicycle, quadratic_disc(), BarrierSettings::keeping()))
+    Filter::builder(Unicycle)
+        .barrier("goal", distance_disc(), BarrierSettings::within(12.0))
+        .and_then(|b| b.barrier("room", quadratic_disc(), BarrierSettings::keeping()))
         .and_then(|b| b.bounds(&BOUNDS.map(|b| -b), &BOUNDS))
         .and_then(|b| b.sampling(Sampling::Measured { first: Some(STEP) }))
         .and_then(FilterBuilder::build)

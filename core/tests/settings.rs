@@ -2,6 +2,8 @@
 
 mod scenario;
 
+use std::sync::Arc;
+
 use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
 use punctual_core::filter::{BarrierSettings, Filter, FilterState, Method};
 use punctual_core::lie;
@@ -12,8 +14,8 @@ use scenario::{Integrator, NonNegative, damping, distance_disc, goal};
 
 /// A filter with these settings and bounds, valid if they are.
 fn build(settings: BarrierSettings, bounds: [[f64; 2]; 2], limit: f64) -> Result<Filter, Error> {
-    Filter::builder(4, 2)
-        .barrier("goal", PointMass, distance_disc(), settings)?
+    Filter::builder(PointMass)
+        .barrier("goal", distance_disc(), settings)?
         .bounds(&bounds[0], &bounds[1])?
         .correction_limit(limit)?
         .build()
@@ -93,14 +95,14 @@ fn shapes_and_models_out_of_range_are_refused() {
 #[test]
 fn the_repeated_root_needs_relative_degree_two_or_more() {
     let settings = BarrierSettings { method: Method::RepeatedRoot, ..BarrierSettings::within(5.0) };
-    let source = lie::along(Integrator::<1>, NonNegative, 1).expect("in range");
+    let source = lie::along(Arc::new(Integrator::<1>), NonNegative, 1).expect("in range");
     refused(
-        Filter::builder(1, 1).source("line", source, settings),
+        Filter::from_sources(1, 1).source("line", source, settings),
         ErrorKind::Unsupported,
         "line.method: the repeated root does not exist for relative degree 1; use the reference profile",
     );
-    let source = lie::along(Integrator::<3>, NonNegative, 3).expect("in range");
-    assert!(Filter::builder(3, 1).source("line", source, settings).is_ok());
+    let source = lie::along(Arc::new(Integrator::<3>), NonNegative, 3).expect("in range");
+    assert!(Filter::from_sources(3, 1).source("line", source, settings).is_ok());
     assert!(build(settings, BOUNDS, 1e6).is_ok());
 }
 
@@ -109,30 +111,30 @@ fn wrong_dimensions_are_refused_when_building() {
     let settings = BarrierSettings::within(5.0);
     let dimension = ErrorKind::Dimension;
     refused(
-        Filter::builder(3, 2).barrier("goal", PointMass, distance_disc(), settings),
+        Filter::builder(PointMass).barrier("goal", distance_disc(), settings),
         dimension,
         "goal.x: has 4 components, must have 3",
     );
     refused(
-        Filter::builder(4, 1).barrier("goal", PointMass, distance_disc(), settings),
+        Filter::builder(PointMass).barrier("goal", distance_disc(), settings),
         dimension,
         "goal.u: has 2 components, must have 1",
     );
     refused(
-        Filter::builder(4, 2).bounds(&[0.0], &[1.0, 1.0]),
+        Filter::from_sources(4, 2).bounds(&[0.0], &[1.0, 1.0]),
         dimension,
         "u_min: has 1 components, must have 2",
     );
     refused(
-        Filter::builder(4, 2).bounds(&[0.0; 2], &[1.0; 3]),
+        Filter::from_sources(4, 2).bounds(&[0.0; 2], &[1.0; 3]),
         dimension,
         "u_max: has 3 components, must have 2",
     );
-    refused(Filter::builder(4, 2).build(), dimension, "barriers: is empty, must have at least 1");
+    refused(Filter::from_sources(4, 2).build(), dimension, "barriers: is empty, must have at least 1");
     // More inputs than the library carries: refused, not a panic, also through the bounds.
-    let wide = Filter::builder(4, 13).bounds(&[0.0; 13], &[1.0; 13]).expect("bounds as many as inputs");
+    let wide = Filter::builder(PointMass).bounds(&[0.0; 13], &[1.0; 13]).expect("bounds as many as inputs");
     refused(
-        wide.barrier("goal", PointMass, distance_disc(), settings),
+        wide.barrier("goal", distance_disc(), settings),
         dimension,
         "goal.u: has 2 components, must have 13",
     );

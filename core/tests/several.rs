@@ -29,10 +29,10 @@ fn one_after_the_other() {
     let by_arrival = [(Begin::AtOnce, End::OnArrival), (Begin::AfterArrival(0), End::Never)];
     let by_clock = [(Begin::AtOnce, End::At(5.0)), (Begin::At(5.0), End::Never)];
     for windows in [by_arrival, by_clock] {
-        let mut filter = Filter::builder(4, 2)
-            .barrier("A", PointMass, disc(20.0, 0.0), BarrierSettings::within(5.0))
+        let mut filter = Filter::builder(PointMass)
+            .barrier("A", disc(20.0, 0.0), BarrierSettings::within(5.0))
             .and_then(|b| b.window(windows[0].0, windows[0].1))
-            .and_then(|b| b.barrier("B", PointMass, disc(-10.0, 15.0), BarrierSettings::within(10.0)))
+            .and_then(|b| b.barrier("B", disc(-10.0, 15.0), BarrierSettings::within(10.0)))
             .and_then(|b| b.window(windows[1].0, windows[1].1))
             .and_then(FilterBuilder::build)
             .expect("valid filter");
@@ -67,14 +67,14 @@ fn a_corridor_obstacles_and_a_speed_limit() {
     let keep = BarrierSettings { margin: 0.01, ..BarrierSettings::within(5.0) };
     let rock = |x, y, r| Outside(DistanceDisc::new([x, y], r, r).expect("valid disc"));
     let wall = |ny, y| HalfPlane::new([0.0, ny], [0.0, y]).expect("valid wall");
-    let mut filter = Filter::builder(4, 2)
-        .barrier("goal", PointMass, disc(30.0, 0.5), BarrierSettings::within(8.0))
-        .and_then(|b| b.barrier("floor", PointMass, wall(1.0, -2.0), keep))
-        .and_then(|b| b.barrier("ceiling", PointMass, wall(-1.0, 3.0), keep))
-        .and_then(|b| b.barrier("rock", PointMass, rock(10.0, -1.2, 1.0), keep))
-        .and_then(|b| b.barrier("stone", PointMass, rock(20.0, 2.2, 1.0), keep))
-        .and_then(|b| b.barrier("speed", PointMass, NormBound::new(2, 9.0).expect("valid"), keep))
-        .and_then(|b| b.barrier("forward", PointMass, StateBound::at_least(2, -0.5).expect("valid"), keep))
+    let mut filter = Filter::builder(PointMass)
+        .barrier("goal", disc(30.0, 0.5), BarrierSettings::within(8.0))
+        .and_then(|b| b.barrier("floor", wall(1.0, -2.0), keep))
+        .and_then(|b| b.barrier("ceiling", wall(-1.0, 3.0), keep))
+        .and_then(|b| b.barrier("rock", rock(10.0, -1.2, 1.0), keep))
+        .and_then(|b| b.barrier("stone", rock(20.0, 2.2, 1.0), keep))
+        .and_then(|b| b.barrier("speed", NormBound::new(2, 9.0).expect("valid"), keep))
+        .and_then(|b| b.barrier("forward", StateBound::at_least(2, -0.5).expect("valid"), keep))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
     let degrees: Vec<usize> = filter.relative_degrees().collect();
@@ -94,9 +94,9 @@ fn a_corridor_obstacles_and_a_speed_limit() {
 #[test]
 fn a_deadlock_is_reported() {
     let rock = Outside(DistanceDisc::new([10.0, 0.0], 3.0, 3.0).expect("valid disc"));
-    let mut filter = Filter::builder(4, 2)
-        .barrier("goal", PointMass, disc(20.0, 0.0), BarrierSettings::within(6.0))
-        .and_then(|b| b.barrier("rock", PointMass, rock, BarrierSettings::within(6.0)))
+    let mut filter = Filter::builder(PointMass)
+        .barrier("goal", disc(20.0, 0.0), BarrierSettings::within(6.0))
+        .and_then(|b| b.barrier("rock", rock, BarrierSettings::within(6.0)))
         .and_then(|b| b.bounds(&[-4.0, -4.0], &[4.0, 4.0]))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
@@ -118,9 +118,11 @@ fn a_deadlock_is_reported() {
 
 #[test]
 fn windows_are_checked() {
-    let builder = || Filter::builder(4, 2);
-    let with = || builder().barrier("goal", PointMass, disc(5.0, 0.0), BarrierSettings::within(4.0));
-    let refused = |b: Result<FilterBuilder, punctual_core::Error>| b.err().expect("refused").to_string();
+    let builder = || Filter::builder(PointMass);
+    let with = || builder().barrier("goal", disc(5.0, 0.0), BarrierSettings::within(4.0));
+    let refused = |b: Result<FilterBuilder<PointMass, 4, 2>, punctual_core::Error>| {
+        b.err().expect("refused").to_string()
+    };
     let window = |begin, end| refused(with().and_then(|b| b.window(begin, end)));
     assert_eq!(window(Begin::At(4.0), End::Never), "goal.begin: is 4, must be < deadline = 4");
     assert_eq!(window(Begin::At(-1.0), End::Never), "goal.begin: is -1, must be finite and >= 0");
@@ -143,10 +145,10 @@ fn windows_are_checked() {
 /// A barrier that waits, or has been released, asks for nothing at the end of the longest step either.
 #[test]
 fn a_window_and_a_longest_step() {
-    let mut filter = Filter::builder(4, 2)
-        .barrier("A", PointMass, disc(5.0, 0.0), BarrierSettings::within(3.0))
+    let mut filter = Filter::builder(PointMass)
+        .barrier("A", disc(5.0, 0.0), BarrierSettings::within(3.0))
         .and_then(|b| b.window(Begin::AtOnce, End::OnArrival))
-        .and_then(|b| b.barrier("B", PointMass, disc(-5.0, 0.0), BarrierSettings::within(6.0)))
+        .and_then(|b| b.barrier("B", disc(-5.0, 0.0), BarrierSettings::within(6.0)))
         .and_then(|b| b.window(Begin::AfterArrival(0), End::Never))
         .and_then(|b| b.period_max(0.02))
         .and_then(FilterBuilder::build)

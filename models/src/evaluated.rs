@@ -17,7 +17,7 @@ use punctual_core::lie::{DerivativeSource, RelativeDegree};
 use punctual_core::scalar::Scalar;
 use punctual_core::{MAX_INPUTS, MAX_ROWS};
 
-use crate::motion::{self, Equations};
+use crate::motion::{self, Equations, Identity};
 use crate::series::Series;
 use crate::syntax::{Function, Operator};
 use crate::tape::{Operation, Record, Register, Step, Value};
@@ -107,6 +107,8 @@ impl Dimensions {
 pub struct CodeModel {
     equations: Evaluated,
     barriers: usize,
+    /// Which plant it is; its clones are the same one.
+    identity: Identity,
 }
 
 impl fmt::Debug for CodeModel {
@@ -159,7 +161,7 @@ impl CodeModel {
         equations.registers =
             (2 * equations.registers + 64).min(2 * MAX_OPERATIONS + states + inputs + RESERVED);
         equations.steps = Vec::new();
-        Ok(Self { equations, barriers })
+        Ok(Self { equations, barriers, identity: Arc::new(()) })
     }
 
     /// The plant, to simulate.
@@ -176,7 +178,8 @@ impl CodeModel {
         if index >= self.barriers {
             return Err(Error::new("barrier", format!("is {index}, must be < {}", self.barriers)));
         }
-        Ok(CodeBarrier { equations: Evaluated { barrier: index, ..self.equations.clone() } })
+        let equations = Evaluated { barrier: index, ..self.equations.clone() };
+        Ok(CodeBarrier { equations, identity: Arc::clone(&self.identity) })
     }
 }
 
@@ -184,6 +187,7 @@ impl CodeModel {
 #[derive(Clone)]
 pub struct CodeBarrier {
     equations: Evaluated,
+    identity: Identity,
 }
 
 impl CodeBarrier {
@@ -204,7 +208,7 @@ impl CodeBarrier {
     ///
     /// `n` outside 1 to [`MAX_RELATIVE_DEGREE`](punctual_core::MAX_RELATIVE_DEGREE).
     pub fn source(&self, n: usize) -> Result<Box<dyn DerivativeSource>, Error> {
-        motion::source(&self.equations, &self.equations, n)
+        motion::source(&self.equations, &self.equations, n, &self.identity)
     }
 }
 

@@ -14,7 +14,7 @@
 //! let n = barrier.relative_degree(&[[f64::NEG_INFINITY, f64::INFINITY]; 3]).uniform();
 //! assert_eq!(n, Some(3));
 //! let source = barrier.source(3)?;
-//! let mut filter = Filter::builder(3, 1).source("past", source, BarrierSettings::within(4.0))?.build()?;
+//! let mut filter = Filter::from_sources(3, 1).source("past", source, BarrierSettings::within(4.0))?.build()?;
 //! let mut u = [0.0];
 //! filter.step(0.0, &[0.0, 10.0, 0.0], &[0.0], &mut u)?;
 //! assert!(u[0] > 0.0);

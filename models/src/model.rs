@@ -1,6 +1,8 @@
 //! Plants and barriers of expressions, as the filter and the simulation take them.
 
+use std::any::Any;
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use punctual_core::MAX_INPUTS;
 use punctual_core::dynamics::DynPlant;
@@ -8,7 +10,7 @@ use punctual_core::lie::{DerivativeSource, RelativeDegree};
 use punctual_core::scalar::Scalar;
 
 use crate::functions::Functions;
-use crate::motion::{self, Equations};
+use crate::motion::{self, Equations, Identity};
 use crate::series::Series;
 use crate::syntax::{self, TIME, Tree};
 use crate::tape::{Record, Register, Step, Tape, Value, needed, unknown};
@@ -25,6 +27,8 @@ pub struct Model {
     tape: Tape,
     /// Registers of the derivatives of the states.
     derivatives: Vec<Register>,
+    /// Which plant it is; its clones are the same one.
+    identity: Identity,
 }
 
 impl Model {
@@ -71,6 +75,7 @@ impl Model {
             parameters: parameters.iter().map(|&(name, value)| (name.to_owned(), value)).collect(),
             tape: Tape::new(states.len() + inputs.len() + 1),
             derivatives: Vec::new(),
+            identity: Arc::new(()),
         };
         for (state, text) in states.iter().zip(derivatives) {
             let register = model.derivative(text);
@@ -89,6 +94,14 @@ impl Model {
             format!("is {text:?}, in which {part:?} is not affine in the input {input}; inputs may only be added and multiplied by what is free of inputs")
         })?;
         Ok(register)
+    }
+
+    /// The same model, as another form of `plant`: barriers along both are along one plant. That both have the same dynamics is
+    /// the caller's promise.
+    #[must_use]
+    pub fn as_form_of(mut self, plant: Arc<dyn Any + Send + Sync>) -> Self {
+        self.identity = plant;
+        self
     }
 
     /// The values of expressions of states, parameters and the time `t`; each has a name for messages.
@@ -203,7 +216,8 @@ impl Barrier {
     ///
     /// `n` outside 1 to [`MAX_RELATIVE_DEGREE`](punctual_core::MAX_RELATIVE_DEGREE).
     pub fn source(&self, n: usize) -> Result<Box<dyn DerivativeSource>, Error> {
-        motion::source(&self.model.equations(None), &self.model.equations(Some(self.h)), n)
+        let Self { model, h } = self;
+        motion::source(&model.equations(None), &model.equations(Some(*h)), n, &model.identity)
     }
 }
 
@@ -245,13 +259,6 @@ impl Equations for Listed {
 
     fn inputs(&self) -> usize {
         self.inputs
-    }
-
-    /// Operations of barriers come after those of the plant, and move none of its registers.
-    fn is_same(&self, other: &Self) -> bool {
-        (self.states, self.inputs) == (other.states, other.inputs)
-            && self.derivatives == other.derivatives
-            && self.steps == other.steps
     }
 
     fn series<C: Scalar>(&self, orders: usize) -> Series<C> {

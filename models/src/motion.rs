@@ -2,6 +2,7 @@
 
 use std::any::Any;
 use std::cell::RefCell;
+use std::sync::Arc;
 
 use punctual_core::MAX_RELATIVE_DEGREE;
 use punctual_core::dynamics::DynPlant;
@@ -10,13 +11,16 @@ use punctual_core::interval::Interval;
 use punctual_core::jet::{Dual, Tangent};
 use punctual_core::lie::{
     Ahead, DerivativeSource, Derivatives, Direction, Directional, EXPANSION_ORDERS, Expansion, ExpansionOver,
-    Predict, PredictDirectional, RateOver, RelativeDegree, SharedPlant,
+    PlantId, Predict, PredictDirectional, RateOver, RelativeDegree, SharedPlant,
 };
 use punctual_core::scalar::Scalar;
 
 use crate::Error;
 use crate::series::Series;
 use crate::tape::Register;
+
+/// Which plant a model is: one object for all barriers along it.
+pub(crate) type Identity = Arc<dyn Any + Send + Sync>;
 
 /// The operations of a plant, or of a barrier along one. Registers: states, inputs, time, then results.
 pub(crate) trait Equations: Clone + Send + 'static {
@@ -25,11 +29,6 @@ pub(crate) trait Equations: Clone + Send + 'static {
 
     /// Number of inputs.
     fn inputs(&self) -> usize;
-
-    /// Whether the operations of the plant are those of `other`. The default knows none that are.
-    fn is_same(&self, _other: &Self) -> bool {
-        false
-    }
 
     /// Memory for `orders` coefficients of every register.
     fn series<C: Scalar>(&self, orders: usize) -> Series<C>;
@@ -89,7 +88,8 @@ pub(crate) fn relative_degree<E: Equations>(
     with_directions!(plant.inputs(), found(plant, along, ranges, driven))
 }
 
-/// The derivatives of the barrier `along` the plant at relative degree `n`, for a filter.
+/// The derivatives of the barrier `along` the plant at relative degree `n`, for a filter. Sources of one `identity` are along
+/// one plant.
 ///
 /// # Errors
 ///
@@ -98,8 +98,14 @@ pub(crate) fn source<E: Equations>(
     plant: &E,
     along: &E,
     n: usize,
+    identity: &Identity,
 ) -> Result<Box<dyn DerivativeSource>, Error> {
-    fn made<E: Equations, const M: usize>(plant: &E, along: &E, n: usize) -> Box<dyn DerivativeSource> {
+    fn made<E: Equations, const M: usize>(
+        plant: &E,
+        along: &E,
+        n: usize,
+        identity: &Identity,
+    ) -> Box<dyn DerivativeSource> {
         let work = Work::<E, M> {
             along: Along::new(plant, along, n),
             flow: Flow::new(plant),
@@ -113,13 +119,13 @@ pub(crate) fn source<E: Equations>(
             rate: vec![0.0; plant.states()],
         };
         let (states, inputs) = (plant.states(), plant.inputs());
-        Box::new(Source { work: RefCell::new(work), plant: plant.clone(), states, inputs, n })
+        Box::new(Source { work: RefCell::new(work), identity: Arc::clone(identity), states, inputs, n })
     }
     if n == 0 || n > MAX_RELATIVE_DEGREE {
         let message = format!("is {n}, must be 1 to {MAX_RELATIVE_DEGREE}");
         return Err(Error::new("relative_degree", message));
     }
-    Ok(with_directions!(plant.inputs(), made(plant, along, n)))
+    Ok(with_directions!(plant.inputs(), made(plant, along, n, identity)))
 }
 
 /// The plant, to simulate.
@@ -349,7 +355,7 @@ impl<E: Equations, const M: usize> Along<E, Dual<M>> {
 /// A barrier along a plant, as the filter takes it.
 struct Source<E, const M: usize> {
     work: RefCell<Work<E, M>>,
-    plant: E,
+    identity: Identity,
     states: usize,
     inputs: usize,
     n: usize,
@@ -430,12 +436,8 @@ impl<E: Equations, const M: usize> DerivativeSource for Source<E, M> {
 
 /// The way ahead is shared. At a sample the operations of plant and barrier are one tape, so of that motion its begin is.
 impl<E: Equations, const M: usize> SharedPlant for Source<E, M> {
-    fn plant(&self) -> &dyn Any {
-        &self.plant
-    }
-
-    fn shares(&self, plant: &dyn Any) -> bool {
-        plant.downcast_ref().is_some_and(|plant| self.plant.is_same(plant))
+    fn plant(&self) -> PlantId {
+        PlantId::of(&self.identity, [self.states, self.inputs])
     }
 
     fn rooms(&self) -> [Box<dyn Any + Send>; 2] {

@@ -16,7 +16,7 @@ fn a_step_allocates_nothing() {
         model.barrier("5 - sqrt((x - 40)^2 + (y - 40)^2 + 1) + min(0, ln(x + 50))").expect("a barrier");
     for sampling in [Sampling::Pointwise, Sampling::Measured { first: None }] {
         let source = barrier.source(2).expect("in range");
-        let mut filter = Filter::builder(4, 2)
+        let mut filter = Filter::from_sources(4, 2)
             .source("goal", source, BarrierSettings::within(5.0))
             .and_then(|b| b.sampling(sampling))
             .and_then(punctual_core::filter::FilterBuilder::build)

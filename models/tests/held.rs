@@ -23,7 +23,7 @@ fn what_is_on_course_crosses_nothing_narrow() {
             let model = Model::new(&["p", "v"], &["a"], &parameters, &["v", rate]).expect("a model");
             let degree = if h == ditch { 2 } else { 1 };
             let source = model.barrier(h).and_then(|b| b.source(degree)).expect("a barrier");
-            let mut filter = Filter::builder(2, 1)
+            let mut filter = Filter::from_sources(2, 1)
                 .source("ditch", source, BarrierSettings::keeping())
                 .and_then(|b| b.bounds(&[-0.5], &[0.5]))
                 .and_then(|b| b.sampling(Sampling::Period(period)))

@@ -39,7 +39,7 @@ struct Case<'a> {
 impl Case<'_> {
     fn filter(&self) -> Filter {
         let [min, max] = [0, 1].map(|side| self.bounds.iter().map(|b| b[side]).collect::<Vec<f64>>());
-        let mut builder = Filter::builder(self.states, self.bounds.len());
+        let mut builder = Filter::from_sources(self.states, self.bounds.len());
         for (k, (expression, n, is_goal)) in self.barriers.iter().enumerate() {
             let settings =
                 if *is_goal { BarrierSettings::within(self.deadline) } else { BarrierSettings::keeping() };

@@ -3,6 +3,8 @@
 //! On a chain of n integrators with h = x₁ the least input is the floor itself. So the state follows the
 //! constraint with equality, and held inputs of `STEP` seconds leave an error of first order in it.
 
+use std::sync::Arc;
+
 use std::array::from_fn;
 
 use punctual_core::MAX_RELATIVE_DEGREE;
@@ -50,8 +52,8 @@ fn follow<const N: usize>(
     x0: [f64; N],
     end: f64,
 ) -> (Vec<f64>, Phase, Option<f64>) {
-    let source = lie::along(Integrators::<N>, First, N).expect("a source");
-    let mut filter = Filter::builder(N, 1)
+    let source = lie::along(Arc::new(Integrators::<N>), First, N).expect("a source");
+    let mut filter = Filter::from_sources(N, 1)
         .source("line", source, BarrierSettings::within(DEADLINE))
         .and_then(|b| b.condition(condition))
         .and_then(|b| b.build())
@@ -157,8 +159,8 @@ fn a_tube_is_kept_until_it_is_the_set() {
 #[test]
 fn settings_that_a_condition_would_replace_are_refused() {
     let build = |settings: BarrierSettings| {
-        let source = lie::along(Integrators::<2>, First, 2).expect("a source");
-        let builder = Filter::builder(2, 1).source("line", source, settings).expect("settings");
+        let source = lie::along(Arc::new(Integrators::<2>), First, 2).expect("a source");
+        let builder = Filter::from_sources(2, 1).source("line", source, settings).expect("settings");
         builder.condition(Chain::new(&[ClassK::Linear(1.0)]).unwrap()).err().map(|e| e.to_string())
     };
     let settings = BarrierSettings::within(1.0);
@@ -171,7 +173,7 @@ fn settings_that_a_condition_would_replace_are_refused() {
         build(BarrierSettings { recovery: Some(1.0), ..settings }).unwrap(),
         "line.recovery: a custom constraint has no recovery"
     );
-    let none = Filter::builder(1, 1).condition(Chain::linear(&[1.0]).unwrap()).err();
+    let none = Filter::from_sources(1, 1).condition(Chain::linear(&[1.0]).unwrap()).err();
     assert_eq!(none.unwrap().to_string(), "condition: there is no barrier yet to have it");
 }
 
@@ -209,8 +211,8 @@ impl Condition for Complete {
 #[test]
 fn a_condition_that_is_a_method() {
     let settings = BarrierSettings { margin: 0.1, ..BarrierSettings::within(DEADLINE) };
-    let mut filter = Filter::builder(2, 1)
-        .source("line", lie::along(Integrators::<2>, First, 2).expect("a source"), settings)
+    let mut filter = Filter::from_sources(2, 1)
+        .source("line", lie::along(Arc::new(Integrators::<2>), First, 2).expect("a source"), settings)
         .and_then(|b| b.condition(Complete))
         .and_then(|b| b.sampling(Sampling::Period(0.01)))
         .and_then(FilterBuilder::build)

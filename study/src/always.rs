@@ -1,6 +1,8 @@
 //! What bounds and u_ref leave of a promise: rows alone, plans, and the filters of the literature that fall back on a
 //! backup.
 
+use std::sync::Arc;
+
 use std::array::from_fn;
 
 use punctual_core::elementary;
@@ -259,8 +261,8 @@ fn point_run((task, method, nominal): (Task, Method, Nominal), x0: [f64; 4]) -> 
     let filter = || {
         let disc = disc()?;
         let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(DEADLINE) };
-        let builder = Filter::builder(2, 2);
-        let builder = builder.source("goal", lie::along(MovedPoint, disc, 1)?, settings)?;
+        let builder = Filter::from_sources(2, 2);
+        let builder = builder.source("goal", lie::along(Arc::new(MovedPoint), disc, 1)?, settings)?;
         let builder = builder.bounds(&bounds.map(|b| -b), &bounds)?;
         let builder = match method {
             Method::Tube => builder.condition(tube(BarrierSettings::default_rate(DEADLINE, 0.0))?)?,

@@ -127,7 +127,7 @@ impl Baseline {
             Self::LowPeak => settings.profile = ProfileKind::LowPeak,
             _ => {}
         }
-        let builder = Filter::builder(source.state_dim(), source.input_dim());
+        let builder = Filter::from_sources(source.state_dim(), source.input_dim());
         let builder = builder.source("goal", source, settings)?;
         let builder = match self {
             Self::Exponential(a) => builder.condition(Exponential::repeated(2, a)?)?,

@@ -1,9 +1,12 @@
 //! The table of docs/bicycle.md: how much of the promise survives where the plant is another bicycle than the
 //! filter's, and what restores it.
 
+use std::sync::Arc;
+
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::{DynPlant, Erased};
-use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Integration, Sampling};
+use punctual_core::filter::{BarrierSettings, Filter, Integration, Sampling};
+use punctual_core::lie;
 use punctual_core::plants::{Bicycle, KinematicBicycle, SmallSlipBicycle, Steering};
 use punctual_cosim::error::Error;
 use rayon::prelude::*;
@@ -163,16 +166,16 @@ impl Pairing {
         let disc = DistanceDisc::new(CENTRE, RADIUS, SMOOTHING)?;
         let integrates = self.filter != Model::Simplified;
         let (states, second) = if integrates { (5, RATE) } else { (4, size.slip) };
-        let builder = Filter::builder(states, 2);
-        let filter = match self.filter {
-            Model::Simplified => builder.barrier("goal", size.simplified()?, disc, settings),
-            Model::SmallSlip => builder.barrier("goal", size.small_slip()?.with_rate(), disc, settings),
-            Model::Kinematic => builder.barrier("goal", size.kinematic()?, disc, settings),
+        let source = match self.filter {
+            Model::Simplified => lie::along(Arc::new(size.simplified()?), disc, 2)?,
+            Model::SmallSlip => lie::along(Arc::new(size.small_slip()?.with_rate()), disc, 2)?,
+            Model::Kinematic => lie::along(Arc::new(size.kinematic()?), disc, 2)?,
         };
-        let filter = filter
-            .and_then(|b| b.sampling(Sampling::Measured { first: Some(step) }))
-            .and_then(|b| b.bounds(&[-ACCELERATION, -second], &[ACCELERATION, second]))
-            .and_then(FilterBuilder::build)?;
+        let filter = Filter::from_sources(states, 2)
+            .source("goal", source, settings)?
+            .sampling(Sampling::Measured { first: Some(step) })?
+            .bounds(&[-ACCELERATION, -second], &[ACCELERATION, second])?
+            .build()?;
         if !integrates {
             return Ok(filter);
         }

@@ -1,6 +1,8 @@
 //! The cases of the study and the demonstration: vehicles, barriers, nominal controllers, and the settings of a
 //! loop.
 
+use std::sync::Arc;
+
 use std::array::from_fn;
 
 use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
@@ -103,11 +105,13 @@ impl Vehicle {
     pub fn source(self, shape: Shape) -> Result<Box<dyn DerivativeSource>, Error> {
         fn shaped<P>(plant: P, shape: Shape) -> Result<Box<dyn DerivativeSource>, punctual_core::Error>
         where
-            P: ControlAffine<4, 2> + Send + 'static,
+            P: ControlAffine<4, 2> + Send + Sync + 'static,
         {
             match shape {
-                Shape::Quadratic => lie::along(plant, QuadraticDisc::new(CENTRE, RADIUS)?, 2),
-                Shape::Distance => lie::along(plant, DistanceDisc::new(CENTRE, RADIUS, SMOOTHING)?, 2),
+                Shape::Quadratic => lie::along(Arc::new(plant), QuadraticDisc::new(CENTRE, RADIUS)?, 2),
+                Shape::Distance => {
+                    lie::along(Arc::new(plant), DistanceDisc::new(CENTRE, RADIUS, SMOOTHING)?, 2)
+                }
             }
         }
         let source = match self {

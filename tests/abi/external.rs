@@ -1,6 +1,8 @@
 //! A filter that is given the derivatives by a simulator that computes them: it gives the bits of the filter that
 //! has the model.
 
+use std::sync::Arc;
+
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::lie::{self, DerivativeSource, Derivatives};
 use punctual_core::plants::PointMass;
@@ -13,7 +15,7 @@ const STEP: f64 = 0.0625;
 /// The goal of both configurations.
 fn source() -> Box<dyn DerivativeSource> {
     let disc = DistanceDisc::new([45.0, 45.0], 2.0, 2.0).expect("valid disc");
-    lie::along(PointMass, disc, 2).expect("in range")
+    lie::along(Arc::new(PointMass), disc, 2).expect("in range")
 }
 
 /// State and reference, and derivatives and reference, at `x`.

@@ -1,5 +1,7 @@
 //! Chains of n integrators from rest: the reference profile for any order.
 
+use std::sync::Arc;
+
 use std::array::from_fn;
 
 use punctual_core::barrier::Barrier;
@@ -45,8 +47,8 @@ fn from_rest<const N: usize>(step: f64) -> (Option<f64>, f64) {
         margin: MARGIN,
         ..BarrierSettings::within(DEADLINE)
     };
-    let mut filter = lie::along(Chain::<N>, NonNegative, N)
-        .and_then(|source| Filter::builder(N, 1).source("line", source, settings))
+    let mut filter = lie::along(Arc::new(Chain::<N>), NonNegative, N)
+        .and_then(|source| Filter::from_sources(N, 1).source("line", source, settings))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
     let mut x0 = [0.0; N];

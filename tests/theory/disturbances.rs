@@ -61,14 +61,14 @@ fn failures<M, P, B, const NX: usize, const NU: usize>(
     nominal: P,
 ) -> Failures
 where
-    M: ControlAffine<NX, NU> + Copy + Send + 'static,
+    M: ControlAffine<NX, NU> + Copy + Send + Sync + 'static,
     B: Barrier<NX> + Copy + Send + 'static,
     P: Fn(&[f64; NX]) -> [f64; NU],
 {
     let mut failures = Failures::default();
     for start in starts {
-        let mut filter = Filter::builder(NX, NU)
-            .barrier("goal", model, barrier, settings)
+        let mut filter = Filter::builder(model)
+            .barrier("goal", barrier, settings)
             .and_then(|b| b.build())
             .expect("a valid filter");
         let deadline = settings.deadline.expect("a deadline");

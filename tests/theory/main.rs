@@ -85,7 +85,7 @@ fn run<P, B>(
     x0: [f64; 4],
 ) -> Run
 where
-    P: ControlAffine<4, 2> + Clone + Send + 'static,
+    P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
     B: Barrier<4> + Send + 'static,
 {
     let sampling = match settings.method {
@@ -120,11 +120,11 @@ fn run_as<P, B>(
     x0: [f64; 4],
 ) -> Run
 where
-    P: ControlAffine<4, 2> + Clone + Send + 'static,
+    P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
     B: Barrier<4> + Send + 'static,
 {
-    let mut filter = Filter::builder(4, 2)
-        .barrier("goal", plant.clone(), barrier, settings)
+    let mut filter = Filter::builder(plant.clone())
+        .barrier("goal", barrier, settings)
         .and_then(|b| b.sampling(scheme.sampling))
         .and_then(|b| b.bounds(&scheme.bounds.map(|v| -v), &scheme.bounds))
         .and_then(FilterBuilder::build)

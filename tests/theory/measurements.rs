@@ -35,7 +35,7 @@ fn failures<P, B, const NX: usize, const NU: usize>(
     nominal: impl Fn(&[f64; NX]) -> [f64; NU],
 ) -> Failures
 where
-    P: ControlAffine<NX, NU> + Copy + Send + 'static,
+    P: ControlAffine<NX, NU> + Copy + Send + Sync + 'static,
     B: Barrier<NX> + Copy + Send + 'static,
 {
     let settings = BarrierSettings {
@@ -47,8 +47,8 @@ where
     let mut failures = Failures::default();
     let mut random = uniform();
     for start in starts {
-        let mut filter = Filter::builder(NX, NU)
-            .barrier("goal", plant, barrier, settings)
+        let mut filter = Filter::builder(plant)
+            .barrier("goal", barrier, settings)
             .and_then(|b| b.measurement_errors(if allowed { &errors } else { &[0.0; NX] }))
             .and_then(|b| b.sampling(Sampling::Measured { first: Some(STEP) }))
             .and_then(|b| b.build())

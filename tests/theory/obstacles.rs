@@ -50,7 +50,7 @@ pub(crate) type Nominal = fn(Heading, &[f64; 4]) -> [f64; 2];
 /// A filter for goal and obstacles.
 pub(crate) fn filter<P>(plant: &P, bounds: [f64; 2]) -> Filter
 where
-    P: ControlAffine<4, 2> + Clone + Send + 'static,
+    P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
 {
     let goal = DistanceDisc::new(GOAL.0, GOAL.1, GOAL.1).expect("valid disc");
     let reach = BarrierSettings { margin: 0.02, ..BarrierSettings::within(DEADLINE) };
@@ -61,13 +61,13 @@ where
         margin: 0.1,
         ..BarrierSettings::within(DEADLINE)
     };
-    let mut builder = Filter::builder(4, 2)
-        .barrier("goal", plant.clone(), goal, reach)
+    let mut builder = Filter::builder(plant.clone())
+        .barrier("goal", goal, reach)
         .and_then(|b| b.bounds(&bounds.map(|v| -v), &bounds))
         .expect("valid goal");
     for (centre, radius) in OBSTACLES {
         let disc = DistanceDisc::new(centre, radius, radius).expect("valid disc");
-        builder = builder.barrier("obstacle", plant.clone(), Outside(disc), avoid).expect("valid obstacle");
+        builder = builder.barrier("obstacle", Outside(disc), avoid).expect("valid obstacle");
     }
     FilterBuilder::build(builder).expect("valid filter")
 }
@@ -78,7 +78,7 @@ pub(crate) fn bicycle(l_r: f64) -> Bicycle {
 
 fn run<P>(plant: &P, bounds: [f64; 2], nominal: Nominal, start: [f64; 4]) -> Run
 where
-    P: ControlAffine<4, 2> + Clone + Send + 'static,
+    P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
 {
     let mut filter = filter(plant, bounds);
     let heading = Heading { speed_limit: 6.0, ..Heading::towards(GOAL.0) };

@@ -13,7 +13,7 @@ const STEP: f64 = 0.01;
 /// Runs at 10 ms with rate 5, margin 0.02 and damping.
 fn runs<P>(profile: ProfileKind, plant: &P, nominal: Nominal) -> Vec<Run>
 where
-    P: ControlAffine<4, 2> + Clone + Send + 'static,
+    P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
 {
     let settings = BarrierSettings {
         profile,

@@ -27,7 +27,7 @@ pub(super) fn drawn(count: usize) -> Vec<[f64; 4]> {
 /// The method of the documentation's table: a = 5, ε = 2, μ = 0.02, nominal damping.
 fn profile_runs<P>(plant: &P, nominal: Nominal, starts: &[[f64; 4]]) -> Vec<Run>
 where
-    P: ControlAffine<4, 2> + Clone + Send + 'static,
+    P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
 {
     let settings = BarrierSettings {
         rate: Some(5.0),

@@ -3,6 +3,7 @@
 use alloc::borrow::ToOwned;
 use alloc::boxed::Box;
 use alloc::string::String;
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use super::rows::{self, BarrierSlot, MeasurementErrors, Rows, Scratch, SharedPlants, Workspace};
@@ -17,8 +18,18 @@ use crate::lie::{self, DerivativeSource};
 use crate::qp::{self, Bounds, Enforcement, Row};
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE, MAX_ROWS};
 
-/// A collection of barriers and bounds for a [`Filter`].
-pub struct FilterBuilder {
+/// A plant with barriers and bounds, for a [`Filter`]. All barriers are along the one plant `P`, with `NX` states and `NU`
+/// inputs. Without type arguments it is a builder of barriers from [sources](Filter::from_sources) alone.
+///
+/// [`profile`](Self::profile), [`condition`](Self::condition), [`window`](Self::window) and
+/// [`strictness`](Self::strictness) belong to the barrier added last.
+pub struct FilterBuilder<P = (), const NX: usize = 0, const NU: usize = 0> {
+    plant: Arc<P>,
+    parts: Parts,
+}
+
+/// What a builder collects, whatever the plant.
+struct Parts {
     state_dim: usize,
     input_dim: usize,
     slots: Vec<BarrierSlot>,
@@ -34,36 +45,39 @@ pub struct FilterBuilder {
 impl FilterBuilder {
     /// The ‖u − u_ref‖ beyond which a row counts as out of reach of the inputs, in units of u.
     pub const DEFAULT_CORRECTION_LIMIT: f64 = 1e6;
+}
 
-    pub(super) fn new(state_dim: usize, input_dim: usize) -> Self {
-        Self {
+impl<P, const NX: usize, const NU: usize> FilterBuilder<P, NX, NU> {
+    pub(super) fn new(plant: P, [state_dim, input_dim]: [usize; 2]) -> Self {
+        let parts = Parts {
             state_dim,
             input_dim,
             slots: Vec::new(),
             bounds: Bounds::NONE,
-            correction_limit: Self::DEFAULT_CORRECTION_LIMIT,
+            correction_limit: FilterBuilder::DEFAULT_CORRECTION_LIMIT,
             sampling: Sampling::default(),
             period_max: 0.0,
             arm_after: 0.0,
             delay: 0.0,
             errors: Vec::new(),
-        }
+        };
+        Self { plant: Arc::new(plant), parts }
     }
 
-    /// Adds a barrier along `plant`; `name` is for messages and reports. Its relative degree is detected on built-in sample
+    /// Adds a barrier along the plant; `name` is for messages and reports. Its relative degree is detected on built-in sample
     /// states ([`lie::detected`]).
     ///
     /// # Errors
     ///
-    /// A relative degree that does not exist or is not uniform (details in [`Error::relative_degree`]); a plant whose
-    /// dimensions are not the filter's; settings outside their ranges.
+    /// A relative degree that does not exist or is not uniform (details in [`Error::relative_degree`]); settings outside
+    /// their ranges.
     ///
     /// ```
     /// # use punctual_core::{barriers::DistanceDisc, filter::*};
     /// # use punctual_core::plants::SmallSlipBicycle;
     /// let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
-    /// let refused = Filter::builder(4, 2)
-    ///     .barrier("goal", SmallSlipBicycle::new(10.0)?, goal, BarrierSettings::within(10.0))
+    /// let refused = Filter::builder(SmallSlipBicycle::new(10.0)?)
+    ///     .barrier("goal", goal, BarrierSettings::within(10.0))
     ///     .err()
     ///     .map(|error| error.to_string());
     /// assert_eq!(
@@ -76,45 +90,51 @@ impl FilterBuilder {
     /// );
     /// # Ok::<(), punctual_core::Error>(())
     /// ```
-    pub fn barrier<P, B, const NX: usize, const NU: usize>(
-        self,
-        name: &str,
-        plant: P,
-        barrier: B,
-        settings: BarrierSettings,
-    ) -> Result<Self, Error>
+    pub fn barrier<B>(self, name: &str, barrier: B, settings: BarrierSettings) -> Result<Self, Error>
     where
-        P: ControlAffine<NX, NU> + Send + 'static,
+        P: ControlAffine<NX, NU> + Send + Sync + 'static,
         B: Barrier<NX> + Send + 'static,
     {
-        let n = lie::detected(&plant, &barrier).require(None).map_err(|e| e.within(name))?;
-        self.source(name, lie::along(plant, barrier, n)?, settings)
+        let n = lie::detected(&*self.plant, &barrier).require(None).map_err(|e| e.within(name))?;
+        let source = lie::along(Arc::clone(&self.plant), barrier, n)?;
+        self.source(name, source, settings)
     }
 
     /// Adds a barrier of the declared relative degree `n`. It is compared with the one found at the states `samples` at t =
     /// 0: for a plant or barrier whose domain the built-in samples miss.
     ///
-    /// To use a barrier against that finding, make its source with [`lie::along`] and add it with [`Self::source`], which
-    /// checks at run time only.
+    /// To use a barrier against that finding, make its source with [`lie::along`] and [`Self::plant`], and add it with
+    /// [`Self::source`], which checks at run time only.
     ///
     /// # Errors
     ///
     /// As for [`Self::barrier`]; the relative degree found is not `n`.
-    pub fn barrier_of_degree<P, B, const NX: usize, const NU: usize>(
+    pub fn barrier_of_degree<B>(
         self,
         name: &str,
-        plant: P,
         barrier: B,
         (n, samples): (usize, &[[f64; NX]]),
         settings: BarrierSettings,
     ) -> Result<Self, Error>
     where
-        P: ControlAffine<NX, NU> + Send + 'static,
+        P: ControlAffine<NX, NU> + Send + Sync + 'static,
         B: Barrier<NX> + Send + 'static,
     {
-        let found = lie::relative_degree(&plant, &barrier, 0.0, samples);
+        let found = lie::relative_degree(&*self.plant, &barrier, 0.0, samples);
         let n = found.require(Some(n)).map_err(|e| e.within(name))?;
-        self.source(name, lie::along(plant, barrier, n)?, settings)
+        let source = lie::along(Arc::clone(&self.plant), barrier, n)?;
+        self.source(name, source, settings)
+    }
+
+    /// The plant, for sources that share it with the barriers added here.
+    pub fn plant(&self) -> Arc<P> {
+        Arc::clone(&self.plant)
+    }
+
+    /// The same builder without the plant in its type, for a plant that is chosen at run time. Further barriers are
+    /// [sources](Self::source).
+    pub fn erased(self) -> FilterBuilder {
+        FilterBuilder { plant: Arc::new(()), parts: self.parts }
     }
 
     /// Adds a barrier of any relative degree, from any source of its derivatives (such as [`lie::along`]).
@@ -128,10 +148,7 @@ impl FilterBuilder {
         source: Box<dyn DerivativeSource>,
         settings: BarrierSettings,
     ) -> Result<Self, Error> {
-        length("x", source.state_dim(), self.state_dim).map_err(|e| e.within(name))?;
-        length("u", source.input_dim(), self.input_dim).map_err(|e| e.within(name))?;
-        let promise = FixedTime::new(source.relative_degree(), settings).map_err(|e| e.within(name))?;
-        self.slots.push(BarrierSlot::new(name, source, promise));
+        self.parts.add(name, source, settings)?;
         Ok(self)
     }
 
@@ -148,14 +165,14 @@ impl FilterBuilder {
     ///
     /// // Arrive in nine tenths of the time.
     /// let early = |anchor: &[f64], deadline: f64, elapsed: f64| Hermite.evaluate(anchor, 0.9 * deadline, elapsed);
-    /// let filter = Filter::builder(4, 2)
-    ///     .barrier("goal", PointMass, DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
+    /// let filter = Filter::builder(PointMass)
+    ///     .barrier("goal", DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
     ///     .profile(early)?
     ///     .build()?;
     /// # Ok::<(), punctual_core::Error>(())
     /// ```
     pub fn profile(mut self, profile: impl Profile + Send + Sync + 'static) -> Result<Self, Error> {
-        let Some(slot) = self.slots.last_mut() else {
+        let Some(slot) = self.parts.slots.last_mut() else {
             return Err(Error::new(ErrorKind::Dimension, "profile", "there is no barrier yet to follow it"));
         };
         let named = |e: Error| e.within(&slot.name);
@@ -175,14 +192,14 @@ impl FilterBuilder {
     /// # use punctual_core::plants::PointMass;
     /// use punctual_reference::baselines::Exponential;
     ///
-    /// let filter = Filter::builder(4, 2)
-    ///     .barrier("goal", PointMass, DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
+    /// let filter = Filter::builder(PointMass)
+    ///     .barrier("goal", DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
     ///     .condition(Exponential::repeated(2, 1.5)?)?
     ///     .build()?;
     /// # Ok::<(), punctual_core::Error>(())
     /// ```
     pub fn condition(mut self, condition: impl Condition + Send + Sync + 'static) -> Result<Self, Error> {
-        let Some(slot) = self.slots.last_mut() else {
+        let Some(slot) = self.parts.slots.last_mut() else {
             return Err(Error::new(ErrorKind::Dimension, "condition", "there is no barrier yet to have it"));
         };
         let named = |e: Error| e.within(&slot.name);
@@ -197,10 +214,10 @@ impl FilterBuilder {
     /// # use punctual_core::plants::PointMass;
     /// // In A by 5 s, then in B by 10 s.
     /// let disc = |x| DistanceDisc::new([x, 0.0], 2.0, 2.0);
-    /// let filter = Filter::builder(4, 2)
-    ///     .barrier("A", PointMass, disc(20.0)?, BarrierSettings::within(5.0))?
+    /// let filter = Filter::builder(PointMass)
+    ///     .barrier("A", disc(20.0)?, BarrierSettings::within(5.0))?
     ///     .window(Begin::AtOnce, End::OnArrival)?
-    ///     .barrier("B", PointMass, disc(-20.0)?, BarrierSettings::within(10.0))?
+    ///     .barrier("B", disc(-20.0)?, BarrierSettings::within(10.0))?
     ///     .window(Begin::AfterArrival(0), End::Never)?
     ///     .build()?;
     /// # Ok::<(), punctual_core::Error>(())
@@ -211,6 +228,171 @@ impl FilterBuilder {
     /// No barrier yet; a time out of range; an end before the deadline, which would promise nothing; waiting for a barrier
     /// that was not added before.
     pub fn window(mut self, begin: Begin, end: End) -> Result<Self, Error> {
+        self.parts.set_window(begin, end)?;
+        Ok(self)
+    }
+
+    /// Sets how the last barrier added is treated if not all can be met. Default: [`Strictness::KeepFirst`].
+    ///
+    /// # Errors
+    ///
+    /// No barrier yet; a penalty that is not finite or ≤ 0.
+    pub fn strictness(mut self, strictness: Strictness) -> Result<Self, Error> {
+        let Some(slot) = self.parts.slots.last_mut() else {
+            return Err(Error::new(
+                ErrorKind::Dimension,
+                "strictness",
+                "there is no barrier yet to have one",
+            ));
+        };
+        if let Strictness::Soft(penalty) = strictness {
+            positive("penalty", penalty).map_err(|e| e.within(&slot.name))?;
+        }
+        slot.strictness = strictness;
+        Ok(self)
+    }
+
+    /// Bounds the input: `min[i]` ≤ u_i ≤ `max[i]`, in units of u; ±infinity for no bound. Default: none.
+    ///
+    /// # Errors
+    ///
+    /// A slice of the wrong length, NaN, a lower bound above its upper bound, a lower bound of +infinity or an upper bound
+    /// of −infinity.
+    pub fn bounds(mut self, min: &[f64], max: &[f64]) -> Result<Self, Error> {
+        length("u_min", min.len(), self.parts.input_dim)?;
+        length("u_max", max.len(), self.parts.input_dim)?;
+        // `build` refuses more inputs than that.
+        for (i, (&low, &high)) in min.iter().zip(max).enumerate().take(MAX_INPUTS) {
+            let range = |field: &str, message: String| {
+                Err(Error::new(ErrorKind::Range, format!("{field}[{}]", i + 1), message))
+            };
+            if low.is_nan() || low == f64::INFINITY {
+                return range("u_min", format!("is {low}, must be a number or -infinity"));
+            }
+            if high.is_nan() || high == f64::NEG_INFINITY {
+                return range("u_max", format!("is {high}, must be a number or +infinity"));
+            }
+            if low > high {
+                return range("u_min", format!("is {low}, must be <= u_max[{}] = {high}", i + 1));
+            }
+            self.parts.bounds.min[i] = low;
+            self.parts.bounds.max[i] = high;
+        }
+        Ok(self)
+    }
+
+    /// Sets the ‖u − u_ref‖ beyond which a row counts as out of reach of the inputs; finite, > 0, in units of u.
+    /// Default: [`FilterBuilder::DEFAULT_CORRECTION_LIMIT`].
+    ///
+    /// # Errors
+    ///
+    /// A limit that is not finite or ≤ 0.
+    pub fn correction_limit(mut self, limit: f64) -> Result<Self, Error> {
+        self.parts.correction_limit = positive("correction_limit", limit)?;
+        Ok(self)
+    }
+
+    /// Chooses how to account for inputs that are held between samples. Default: [`Sampling::Measured`].
+    ///
+    /// # Errors
+    ///
+    /// A period that is not finite or ≤ 0.
+    pub fn sampling(mut self, sampling: Sampling) -> Result<Self, Error> {
+        self.parts.sampling = sampling.validated()?;
+        Ok(self)
+    }
+
+    /// Sets the longest time in s that may pass between two samples, finite, > 0. Promises then hold for steps of any length
+    /// up to it. A longer step suspends them until the next sample shows that they can be given again. Default: the period
+    /// that [`Sampling`] assumes.
+    ///
+    /// # Errors
+    ///
+    /// A time that is not finite or ≤ 0.
+    pub fn period_max(mut self, longest: f64) -> Result<Self, Error> {
+        self.parts.period_max = positive("period_max", longest)?;
+        Ok(self)
+    }
+
+    /// Sets the time in s, finite, ≥ 0, from the filter's first sample until it is armed: every deadline counts from the
+    /// first sample with valid inputs after that. Default: 0, the first sample itself. For a loop that passes zeros, or has
+    /// to settle, before it is under way.
+    ///
+    /// Until then nothing is asked and nothing is promised: the input is u_ref within its bounds, the status
+    /// [`NotArmed`](super::Status::NotArmed). From then on every bit is that of a filter whose first sample came then.
+    /// [`Filter::rearm`] does not make it wait again.
+    ///
+    /// # Errors
+    ///
+    /// A time that is not finite or < 0.
+    pub fn arm_after(mut self, seconds: f64) -> Result<Self, Error> {
+        self.parts.arm_after = non_negative("arm_after", seconds)?;
+        Ok(self)
+    }
+
+    /// Sets the time in s, finite, ≥ 0, from a sample until its input acts: one communication step under a master that first
+    /// exchanges all values (Jacobi). Default: 0.
+    ///
+    /// Until then the input of the previous step is assumed to act; before the first, 0 or the nearest admissible input. So
+    /// the delay must not exceed the sampling period. The constraint is enforced from the predicted state at t + delay on.
+    /// In every barrier report all values but [`h`](super::BarrierReport::h) refer to that time. Deadlines count from the
+    /// first sample itself.
+    ///
+    /// # Errors
+    ///
+    /// A delay that is not finite or < 0.
+    pub fn actuation_delay(mut self, delay: f64) -> Result<Self, Error> {
+        self.parts.delay = non_negative("actuation_delay", delay)?;
+        Ok(self)
+    }
+
+    /// Bounds the errors of the measured state: |x̂_i − x_i| ≤ `errors[i]` at every sample, finite, ≥ 0, in the unit
+    /// of x_i. The promises then hold for the true state, to first order in the errors. Default: none.
+    ///
+    /// Needs a prediction over the period, and a method that allows for errors: the reference profile, or a custom condition
+    /// that says so. `deadline_unreachable` then stays false until the deadline has passed, and there are no directional
+    /// derivatives. A step takes about four times the work per measured state.
+    ///
+    /// # Errors
+    ///
+    /// A slice of the wrong length, an error that is not finite or < 0.
+    pub fn measurement_errors(mut self, errors: &[f64]) -> Result<Self, Error> {
+        length("measurement_errors", errors.len(), self.parts.state_dim)?;
+        for (i, &error) in errors.iter().enumerate() {
+            non_negative(&format!("measurement_errors[{}]", i + 1), error)?;
+        }
+        self.parts.errors = errors.to_vec();
+        Ok(self)
+    }
+
+    /// Builds the filter, not yet anchored.
+    ///
+    /// # Errors
+    ///
+    /// No barrier, or more than [`MAX_ROWS`]; no state or input, or more than [`MAX_INPUTS`] inputs. An actuation delay that
+    /// exceeds a given sampling period, or over which a source cannot predict. Measurement errors with a delay, without a
+    /// prediction over the period, with a method that does not allow for them, or with a source that gives no derivatives
+    /// along a direction.
+    pub fn build(self) -> Result<Filter, Error> {
+        self.parts.build()
+    }
+}
+
+impl Parts {
+    fn add(
+        &mut self,
+        name: &str,
+        source: Box<dyn DerivativeSource>,
+        settings: BarrierSettings,
+    ) -> Result<(), Error> {
+        length("x", source.state_dim(), self.state_dim).map_err(|e| e.within(name))?;
+        length("u", source.input_dim(), self.input_dim).map_err(|e| e.within(name))?;
+        let promise = FixedTime::new(source.relative_degree(), settings).map_err(|e| e.within(name))?;
+        self.slots.push(BarrierSlot::new(name, source, promise));
+        Ok(())
+    }
+
+    fn set_window(&mut self, begin: Begin, end: End) -> Result<(), Error> {
         let Some(index) = self.slots.len().checked_sub(1) else {
             return Err(Error::new(ErrorKind::Dimension, "window", "there is no barrier yet to have one"));
         };
@@ -249,151 +431,10 @@ impl FilterBuilder {
             );
         }
         (slot.begin, slot.end) = (begin, end);
-        Ok(self)
+        Ok(())
     }
 
-    /// Sets how the last barrier added is treated if not all can be met. Default: [`Strictness::KeepFirst`].
-    ///
-    /// # Errors
-    ///
-    /// No barrier yet; a penalty that is not finite or ≤ 0.
-    pub fn strictness(mut self, strictness: Strictness) -> Result<Self, Error> {
-        let Some(slot) = self.slots.last_mut() else {
-            return Err(Error::new(
-                ErrorKind::Dimension,
-                "strictness",
-                "there is no barrier yet to have one",
-            ));
-        };
-        if let Strictness::Soft(penalty) = strictness {
-            positive("penalty", penalty).map_err(|e| e.within(&slot.name))?;
-        }
-        slot.strictness = strictness;
-        Ok(self)
-    }
-
-    /// Bounds the input: `min[i]` ≤ u_i ≤ `max[i]`, in units of u; ±infinity for no bound. Default: none.
-    ///
-    /// # Errors
-    ///
-    /// A slice of the wrong length, NaN, a lower bound above its upper bound, a lower bound of +infinity or an upper bound
-    /// of −infinity.
-    pub fn bounds(mut self, min: &[f64], max: &[f64]) -> Result<Self, Error> {
-        length("u_min", min.len(), self.input_dim)?;
-        length("u_max", max.len(), self.input_dim)?;
-        // `build` refuses more inputs than that.
-        for (i, (&low, &high)) in min.iter().zip(max).enumerate().take(MAX_INPUTS) {
-            let range = |field: &str, message: String| {
-                Err(Error::new(ErrorKind::Range, format!("{field}[{}]", i + 1), message))
-            };
-            if low.is_nan() || low == f64::INFINITY {
-                return range("u_min", format!("is {low}, must be a number or -infinity"));
-            }
-            if high.is_nan() || high == f64::NEG_INFINITY {
-                return range("u_max", format!("is {high}, must be a number or +infinity"));
-            }
-            if low > high {
-                return range("u_min", format!("is {low}, must be <= u_max[{}] = {high}", i + 1));
-            }
-            self.bounds.min[i] = low;
-            self.bounds.max[i] = high;
-        }
-        Ok(self)
-    }
-
-    /// Sets the ‖u − u_ref‖ beyond which a row counts as out of reach of the inputs; finite, > 0, in units of u.
-    /// Default: [`Self::DEFAULT_CORRECTION_LIMIT`].
-    ///
-    /// # Errors
-    ///
-    /// A limit that is not finite or ≤ 0.
-    pub fn correction_limit(mut self, limit: f64) -> Result<Self, Error> {
-        self.correction_limit = positive("correction_limit", limit)?;
-        Ok(self)
-    }
-
-    /// Chooses how to account for inputs that are held between samples. Default: [`Sampling::Measured`].
-    ///
-    /// # Errors
-    ///
-    /// A period that is not finite or ≤ 0.
-    pub fn sampling(mut self, sampling: Sampling) -> Result<Self, Error> {
-        self.sampling = sampling.validated()?;
-        Ok(self)
-    }
-
-    /// Sets the longest time in s that may pass between two samples, finite, > 0. Promises then hold for steps of any length
-    /// up to it. A longer step suspends them until the next sample shows that they can be given again. Default: the period
-    /// that [`Sampling`] assumes.
-    ///
-    /// # Errors
-    ///
-    /// A time that is not finite or ≤ 0.
-    pub fn period_max(mut self, longest: f64) -> Result<Self, Error> {
-        self.period_max = positive("period_max", longest)?;
-        Ok(self)
-    }
-
-    /// Sets the time in s, finite, ≥ 0, from the filter's first sample until it is armed: every deadline counts from the
-    /// first sample with valid inputs after that. Default: 0, the first sample itself. For a loop that passes zeros, or has
-    /// to settle, before it is under way.
-    ///
-    /// Until then nothing is asked and nothing is promised: the input is u_ref within its bounds, the status
-    /// [`NotArmed`](super::Status::NotArmed). From then on every bit is that of a filter whose first sample came then.
-    /// [`Filter::rearm`] does not make it wait again.
-    ///
-    /// # Errors
-    ///
-    /// A time that is not finite or < 0.
-    pub fn arm_after(mut self, seconds: f64) -> Result<Self, Error> {
-        self.arm_after = non_negative("arm_after", seconds)?;
-        Ok(self)
-    }
-
-    /// Sets the time in s, finite, ≥ 0, from a sample until its input acts: one communication step under a master that first
-    /// exchanges all values (Jacobi). Default: 0.
-    ///
-    /// Until then the input of the previous step is assumed to act; before the first, 0 or the nearest admissible input. So
-    /// the delay must not exceed the sampling period. The constraint is enforced from the predicted state at t + delay on.
-    /// In every barrier report all values but [`h`](super::BarrierReport::h) refer to that time. Deadlines count from the
-    /// first sample itself.
-    ///
-    /// # Errors
-    ///
-    /// A delay that is not finite or < 0.
-    pub fn actuation_delay(mut self, delay: f64) -> Result<Self, Error> {
-        self.delay = non_negative("actuation_delay", delay)?;
-        Ok(self)
-    }
-
-    /// Bounds the errors of the measured state: |x̂_i − x_i| ≤ `errors[i]` at every sample, finite, ≥ 0, in the unit
-    /// of x_i. The promises then hold for the true state, to first order in the errors. Default: none.
-    ///
-    /// Needs a prediction over the period, and a method that allows for errors: the reference profile, or a custom condition
-    /// that says so. `deadline_unreachable` then stays false until the deadline has passed, and there are no directional
-    /// derivatives. A step takes about four times the work per measured state.
-    ///
-    /// # Errors
-    ///
-    /// A slice of the wrong length, an error that is not finite or < 0.
-    pub fn measurement_errors(mut self, errors: &[f64]) -> Result<Self, Error> {
-        length("measurement_errors", errors.len(), self.state_dim)?;
-        for (i, &error) in errors.iter().enumerate() {
-            non_negative(&format!("measurement_errors[{}]", i + 1), error)?;
-        }
-        self.errors = errors.to_vec();
-        Ok(self)
-    }
-
-    /// Builds the filter, not yet anchored.
-    ///
-    /// # Errors
-    ///
-    /// No barrier, or more than [`MAX_ROWS`]; no state or input, or more than [`MAX_INPUTS`] inputs. An actuation delay that
-    /// exceeds a given sampling period, or over which a source cannot predict. Measurement errors with a delay, without a
-    /// prediction over the period, with a method that does not allow for them, or with a source that gives no derivatives
-    /// along a direction.
-    pub fn build(self) -> Result<Filter, Error> {
+    fn build(self) -> Result<Filter, Error> {
         let Self {
             state_dim,
             input_dim,

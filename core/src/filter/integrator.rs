@@ -23,8 +23,8 @@ use crate::qp::Bounds;
 /// let model = SmallSlipBicycle::new(10.0)?.with_rate();
 /// // β, the last state, is the integral of input 1, and within 0.5 rad.
 /// let beta = Integration { state: 4, input: 1, limits: [-0.5, 0.5], gain: 10.0 };
-/// let mut filter = Filter::builder(5, 2)
-///     .barrier("goal", model, goal, BarrierSettings::within(10.0))?
+/// let mut filter = Filter::builder(model)
+///     .barrier("goal", goal, BarrierSettings::within(10.0))?
 ///     .build()?
 ///     .with_integrator(beta)?;
 /// filter.expect_hold(Some(0.01))?;

@@ -36,6 +36,7 @@ use alloc::boxed::Box;
 #[cfg(feature = "plan")]
 use crate::MAX_INPUTS;
 use crate::convergence::FixedTimeState;
+use crate::dynamics::ControlAffine;
 use crate::error::{Error, ErrorKind, length, positive};
 use crate::lie::{DerivativeSource, Direction};
 #[cfg(feature = "plan")]
@@ -72,9 +73,18 @@ pub struct Filter {
 }
 
 impl Filter {
-    /// Starts a filter for a plant with `state_dim` states and `input_dim` inputs.
-    pub fn builder(state_dim: usize, input_dim: usize) -> FilterBuilder {
-        FilterBuilder::new(state_dim, input_dim)
+    /// Starts a filter for `plant`, along which all its barriers are.
+    pub fn builder<P, const NX: usize, const NU: usize>(plant: P) -> FilterBuilder<P, NX, NU>
+    where
+        P: ControlAffine<NX, NU>,
+    {
+        FilterBuilder::new(plant, [NX, NU])
+    }
+
+    /// Starts a filter for `state_dim` states and `input_dim` inputs, whose barriers are [sources](FilterBuilder::source) of
+    /// derivatives: of models that are known at run time only, or of derivatives computed elsewhere.
+    pub fn from_sources(state_dim: usize, input_dim: usize) -> FilterBuilder {
+        FilterBuilder::new((), [state_dim, input_dim])
     }
 
     /// Puts an integrator between the filter and its plant. Call it before adding plans.
@@ -122,8 +132,8 @@ impl Filter {
     /// ```
     /// # use punctual_core::{barriers::DistanceDisc, filter::*};
     /// # use punctual_core::plants::PointMass;
-    /// let mut filter = Filter::builder(4, 2)
-    ///     .barrier("goal", PointMass, DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
+    /// let mut filter = Filter::builder(PointMass)
+    ///     .barrier("goal", DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
     ///     .build()?;
     /// let mut u = [0.0; 2];
     /// let error = filter.step(0.0, &[0.0; 3], &[0.0; 2], &mut u).unwrap_err();
@@ -281,8 +291,8 @@ impl Filter {
     /// ```
     /// # use punctual_core::{barriers::DistanceDisc, filter::*, lie::Direction};
     /// # use punctual_core::plants::PointMass;
-    /// let mut filter = Filter::builder(4, 2)
-    ///     .barrier("goal", PointMass, DistanceDisc::new([45.0, 0.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
+    /// let mut filter = Filter::builder(PointMass)
+    ///     .barrier("goal", DistanceDisc::new([45.0, 0.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
     ///     .build()?;
     /// let mut derivative = SampleDerivative::default();
     /// // Wanted sideways: the row, which is on the x axis, lets it pass. Wanted forwards: it makes up for it.

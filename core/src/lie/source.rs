@@ -1,6 +1,7 @@
 //! The derivatives of a barrier, as the filter asks for them, from any source.
 
 use alloc::boxed::Box;
+use alloc::sync::Arc;
 use core::any::Any;
 
 use super::{Ahead, Derivatives};
@@ -148,17 +149,29 @@ pub trait Predict {
     }
 }
 
+/// Which plant a source is along: one object in memory, which all of its sources share. Two objects are two plants, even if
+/// their numbers are the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PlantId {
+    address: usize,
+    dims: [usize; 2],
+}
+
+impl PlantId {
+    /// The identity of `plant`, used with `dims` states and inputs.
+    pub fn of<P: ?Sized>(plant: &Arc<P>, dims: [usize; 2]) -> Self {
+        Self { address: Arc::as_ptr(plant).cast::<()>().addr(), dims }
+    }
+}
+
 /// The part of a source's work that depends on the plant alone, so that barriers of one relative degree along one plant need
 /// it only once. Sharing does not change a bit of the numbers.
 ///
-/// Rooms hold what one method writes for another. Only sources that [share](Self::shares) a plant know their contents.
+/// Rooms hold what one method writes for another. Only sources of one relative degree along one [plant](Self::plant), whose
+/// rooms are of the same types, know their contents.
 pub trait SharedPlant {
-    /// The plant.
-    fn plant(&self) -> &dyn Any;
-
-    /// Whether `plant`, which belongs to another source of the same relative degree, is this one, so that the rooms of both
-    /// are alike.
-    fn shares(&self, plant: &dyn Any) -> bool;
+    /// Which plant it is.
+    fn plant(&self) -> PlantId;
 
     /// Rooms for [`Self::motion`] and for [`Self::motion_ahead`].
     fn rooms(&self) -> [Box<dyn Any + Send>; 2];

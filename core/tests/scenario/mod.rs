@@ -46,11 +46,11 @@ pub(crate) fn distance_disc() -> DistanceDisc {
 /// A filter with one barrier of relative degree 2, "goal".
 pub(crate) fn one<P, B>(plant: P, barrier: B, settings: BarrierSettings) -> Filter
 where
-    P: ControlAffine<4, 2> + Send + 'static,
+    P: ControlAffine<4, 2> + Send + Sync + 'static,
     B: Barrier<4> + Send + 'static,
 {
-    Filter::builder(4, 2)
-        .barrier("goal", plant, barrier, settings)
+    Filter::builder(plant)
+        .barrier("goal", barrier, settings)
         .and_then(punctual_core::filter::FilterBuilder::build)
         .expect("valid filter")
 }

@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "each test binary uses its part")]
 
+use std::sync::Arc;
+
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, QuadraticDisc};
 use punctual_core::dynamics::ControlAffine;
@@ -148,17 +150,17 @@ pub(crate) fn bicycle() -> Bicycle {
 /// The derivatives of the case `name` of `values.csv`, at its relative degree.
 pub(crate) fn source(name: &str) -> Box<dyn DerivativeSource> {
     match name {
-        "point_mass/quadratic" => lie::along(PointMass, quadratic_disc(), 2),
-        "point_mass/distance" => lie::along(PointMass, distance_disc(), 2),
-        "unicycle/quadratic" => lie::along(Unicycle, quadratic_disc(), 2),
-        "unicycle/distance" => lie::along(Unicycle, distance_disc(), 2),
-        "unicycle/moving" => lie::along(Unicycle, MovingDisc, 2),
-        "bicycle/quadratic" => lie::along(bicycle(), quadratic_disc(), 2),
-        "bicycle/distance" => lie::along(bicycle(), distance_disc(), 2),
-        "bicycle/speed" => lie::along(bicycle(), SpeedLimit, 1),
-        "cart/powers" => lie::along(Cart, Powers, 2),
-        "chain4" => lie::along(Chain4, Logarithmic, 4),
-        "chain8" => lie::along(Chain8, Exponential, 8),
+        "point_mass/quadratic" => lie::along(Arc::new(PointMass), quadratic_disc(), 2),
+        "point_mass/distance" => lie::along(Arc::new(PointMass), distance_disc(), 2),
+        "unicycle/quadratic" => lie::along(Arc::new(Unicycle), quadratic_disc(), 2),
+        "unicycle/distance" => lie::along(Arc::new(Unicycle), distance_disc(), 2),
+        "unicycle/moving" => lie::along(Arc::new(Unicycle), MovingDisc, 2),
+        "bicycle/quadratic" => lie::along(Arc::new(bicycle()), quadratic_disc(), 2),
+        "bicycle/distance" => lie::along(Arc::new(bicycle()), distance_disc(), 2),
+        "bicycle/speed" => lie::along(Arc::new(bicycle()), SpeedLimit, 1),
+        "cart/powers" => lie::along(Arc::new(Cart), Powers, 2),
+        "chain4" => lie::along(Arc::new(Chain4), Logarithmic, 4),
+        "chain8" => lie::along(Arc::new(Chain8), Exponential, 8),
         _ => panic!("values.csv has the case {name}, which tests/support does not"),
     }
     .expect("a relative degree in range")

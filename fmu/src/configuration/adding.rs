@@ -1,18 +1,95 @@
 //! A barrier on its way into a filter: its derivatives along the plant.
 
+use std::cell::OnceCell;
+use std::sync::Arc;
+
 use punctual_core::Error;
 use punctual_core::barrier::Barrier;
 use punctual_core::dynamics::{ControlAffine, WithPoint};
 use punctual_core::filter::FilterBuilder;
 use punctual_core::lie::{self, DerivativeSource, RelativeDegree};
-use punctual_core::plants::{PointMass, Signal, Unicycle};
+use punctual_core::plants::{
+    Bicycle, KinematicBicycle, PointMass, Signal, SmallSlipBicycle, SmallSlipBicycleWithRate, Unicycle,
+};
+use punctual_models::Model;
+use punctual_models::evaluated::CodeModel;
 
 use super::filter::UNBOUNDED;
-use super::{BarrierSection, ConfigurationError, FilterConfiguration, ModelName, PlantSection};
+use super::{
+    BarrierSection, ConfigurationError, FilterConfiguration, ModelName, PlantSection, ReferenceSection,
+};
+
+/// The plant of a configuration, along which all its barriers are: each form that a barrier needs is made once.
+#[derive(Default)]
+pub(super) struct Forms {
+    reference: OnceCell<Reference>,
+    expressions: OnceCell<Model>,
+    code: OnceCell<CodeModel>,
+}
+
+/// A plant that has a name.
+#[derive(Clone)]
+enum Reference {
+    PointMass(Arc<PointMass>),
+    Unicycle(Arc<Unicycle>),
+    Bicycle(Arc<Bicycle>),
+    SmallSlip(Arc<SmallSlipBicycle>),
+    SmallSlipRate(Arc<SmallSlipBicycleWithRate>),
+    Kinematic(Arc<KinematicBicycle>),
+}
+
+/// The content of `cell`, which `make` makes at first.
+fn made<T>(
+    cell: &OnceCell<T>,
+    make: impl FnOnce() -> Result<T, ConfigurationError>,
+) -> Result<&T, ConfigurationError> {
+    match cell.get() {
+        Some(content) => Ok(content),
+        None => make().map(|content| cell.get_or_init(|| content)),
+    }
+}
+
+impl Forms {
+    /// The plant `section` as code of this crate.
+    fn reference(&self, section: &ReferenceSection) -> Result<&Reference, ConfigurationError> {
+        made(&self.reference, || {
+            Ok(match section.model {
+                ModelName::PointMass => Reference::PointMass(Arc::new(PointMass)),
+                ModelName::Unicycle => Reference::Unicycle(Arc::new(Unicycle)),
+                ModelName::Bicycle => Reference::Bicycle(Arc::new(section.bicycle()?)),
+                ModelName::BicycleSmallSlip => Reference::SmallSlip(Arc::new(section.small_slip()?)),
+                ModelName::BicycleSmallSlipRate => {
+                    Reference::SmallSlipRate(Arc::new(section.small_slip()?.with_rate()))
+                }
+                ModelName::BicycleKinematic => Reference::Kinematic(Arc::new(section.kinematic()?)),
+                ModelName::BicycleKinematicAngle | ModelName::BicycleKinematicSlip => {
+                    return Err(not_affine(section.model));
+                }
+            })
+        })
+    }
+
+    /// The plant as expressions.
+    fn expressions(&self, plant: &PlantSection) -> Result<&Model, ConfigurationError> {
+        made(&self.expressions, || {
+            let model = plant.expressions()?;
+            let Some(section) = plant.reference() else { return Ok(model) };
+            Ok(model.as_form_of(match self.reference(section)?.clone() {
+                Reference::PointMass(plant) => plant,
+                Reference::Unicycle(plant) => plant,
+                Reference::Bicycle(plant) => plant,
+                Reference::SmallSlip(plant) => plant,
+                Reference::SmallSlipRate(plant) => plant,
+                Reference::Kinematic(plant) => plant,
+            }))
+        })
+    }
+}
 
 /// A barrier of a configuration, and the filter that it goes into.
 pub(super) struct Adding<'a> {
     pub(super) configuration: &'a FilterConfiguration,
+    pub(super) plant: &'a Forms,
     pub(super) builder: FilterBuilder,
     /// The index of the barrier.
     pub(super) index: usize,
@@ -110,40 +187,35 @@ impl Adding<'_> {
             return Err(ConfigurationError::new(field, "is for the plants that have a name"));
         };
         let barrier = barrier(plant.model.states()).map_err(|e| self.named(e))?;
-        match plant.model {
-            ModelName::PointMass => self.along_plant::<_, _, 4, 8>(PointMass, barrier),
-            ModelName::Unicycle => self.along_plant::<_, _, 4, 8>(Unicycle, barrier),
-            ModelName::Bicycle => self.along_plant::<_, _, 4, 8>(plant.bicycle()?, barrier),
-            ModelName::BicycleSmallSlip => self.along_plant::<_, _, 4, 8>(plant.small_slip()?, barrier),
-            ModelName::BicycleSmallSlipRate => {
-                self.along_plant::<_, _, 5, 9>(plant.small_slip()?.with_rate(), barrier)
-            }
-            ModelName::BicycleKinematic => self.along_plant::<_, _, 5, 9>(plant.kinematic()?, barrier),
-            ModelName::BicycleKinematicAngle | ModelName::BicycleKinematicSlip => {
-                Err(not_affine(plant.model))
-            }
+        match self.plant.reference(plant)?.clone() {
+            Reference::PointMass(plant) => self.along_plant::<_, _, 4, 8>(plant, barrier),
+            Reference::Unicycle(plant) => self.along_plant::<_, _, 4, 8>(plant, barrier),
+            Reference::Bicycle(plant) => self.along_plant::<_, _, 4, 8>(plant, barrier),
+            Reference::SmallSlip(plant) => self.along_plant::<_, _, 4, 8>(plant, barrier),
+            Reference::SmallSlipRate(plant) => self.along_plant::<_, _, 5, 9>(plant, barrier),
+            Reference::Kinematic(plant) => self.along_plant::<_, _, 5, 9>(plant, barrier),
         }
     }
 
     /// Adds it along a plant. `EXTENDED` = `NX` + 4 states where the barrier follows a point.
     fn along_plant<P, B, const NX: usize, const EXTENDED: usize>(
         mut self,
-        plant: P,
+        plant: Arc<P>,
         barrier: B,
     ) -> Result<FilterBuilder, ConfigurationError>
     where
-        P: ControlAffine<NX, 2> + Send + 'static,
+        P: ControlAffine<NX, 2> + Copy + Send + Sync + 'static,
         B: Barrier<NX> + Barrier<EXTENDED> + Send + 'static,
     {
         let dim = NX + self.configuration.barrier_inputs().len();
         let source = if self.section().shape.followed().is_none() {
-            self.degree(lie::detected(&plant, &barrier), || None)
+            self.degree(lie::detected(&*plant, &barrier), || None)
                 .and_then(|n| lie::along(plant, barrier, n))
                 .and_then(|source| lie::embedded(source, dim, &std::array::from_fn::<_, NX, _>(|i| i)))
         } else {
-            let (plant, first) = (WithPoint::<_, NX>(plant), self.first);
+            let (plant, first) = (Arc::new(WithPoint::<_, NX>(*plant)), self.first);
             let picks = std::array::from_fn::<_, EXTENDED, _>(|i| if i < NX { i } else { first + i - NX });
-            self.degree(lie::detected::<_, _, EXTENDED, 2>(&plant, &barrier), || None)
+            self.degree(lie::detected::<_, _, EXTENDED, 2>(&*plant, &barrier), || None)
                 .and_then(|n| lie::along::<_, _, EXTENDED, 2>(plant, barrier, n))
                 .and_then(|source| lie::embedded(source, dim, &picks))
         };
@@ -153,7 +225,8 @@ impl Adding<'_> {
     /// Adds an expression, along any plant.
     pub(super) fn expression(self, text: &str) -> Result<FilterBuilder, ConfigurationError> {
         let plant = &self.configuration.plant;
-        let barrier = plant.expressions()?.barrier(text).map_err(|e| self.of_model(&e))?;
+        let model = self.plant.expressions(plant)?;
+        let barrier = model.barrier(text).map_err(|e| self.of_model(&e))?;
         let ranges = plant.ranges();
         let found = barrier.relative_degree(&ranges);
         self.model(found, || barrier.driven_degree(&ranges), |n| barrier.source(n))
@@ -167,8 +240,8 @@ impl Adding<'_> {
             return Err(ConfigurationError::new(field, "is for the plants that are a plug-in"));
         };
         let position = plant.plugin_barriers().iter().position(|b| b.name == output);
-        let barrier =
-            plugin.code()?.barrier(position.unwrap_or(usize::MAX)).map_err(|e| self.of_model(&e))?;
+        let model = made(&self.plant.code, || plugin.code())?;
+        let barrier = model.barrier(position.unwrap_or(usize::MAX)).map_err(|e| self.of_model(&e))?;
         let ranges = plant.ranges();
         let found = barrier.relative_degree(&ranges);
         self.model(found, || barrier.driven_degree(&ranges), |n| barrier.source(n))

@@ -8,7 +8,7 @@ use punctual_core::lie::RelativeDegree;
 use punctual_core::plan::{Failure, Names};
 use serde::{Deserialize, Serialize};
 
-use super::adding::{Adding, MixedDegree, not_affine};
+use super::adding::{Adding, Forms, MixedDegree, not_affine};
 use super::alone::within;
 use super::barrier::RawBarrier;
 use super::key::{
@@ -594,14 +594,21 @@ impl FilterConfiguration {
         let inputs = self.plant.inputs();
         let states = self.plant.states().len();
         let mut next_point = states;
-        let mut builder = Filter::builder(states + self.barrier_inputs().len(), inputs.len());
+        let plant = Forms::default();
+        let mut builder = Filter::from_sources(states + self.barrier_inputs().len(), inputs.len());
         // The barriers, each with its window and its strictness.
         for (i, section) in self.barrier.iter().enumerate() {
             let first = next_point;
             next_point += section.inputs(&self.plant).len();
             let mixed_degree = mixed_degree.reborrow();
-            builder =
-                section.shape.add(Adding { configuration: self, builder, index: i, first, mixed_degree })?;
+            builder = section.shape.add(Adding {
+                configuration: self,
+                plant: &plant,
+                builder,
+                index: i,
+                first,
+                mixed_degree,
+            })?;
             let (begin, end) = self.window(i)?;
             let strictness = match (section.penalty, section.priority) {
                 (Some(_), Some(_)) => {

@@ -39,8 +39,8 @@ impl ControlAffine<4, 2> for PointMass {
 /// None: the numbers are in range.
 pub fn filter() -> Result<Box<Filter>, Error> {
     let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
-    let mut filter = Filter::builder(4, 2)
-        .barrier("goal", PointMass, goal, BarrierSettings::within(10.0))?
+    let mut filter = Filter::builder(PointMass)
+        .barrier("goal", goal, BarrierSettings::within(10.0))?
         .bounds(&[-4.0, -4.0], &[4.0, 4.0])?
         .build()?;
     filter.expect_hold(Some(0.01))?;

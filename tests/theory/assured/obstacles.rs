@@ -38,7 +38,7 @@ struct Run {
 /// Runs from `start` until half as long again as the deadline, if it is accepted and to be driven.
 fn run<P>(plant: &P, bounds: [f64; 2], nominal: Nominal, start: [f64; 4], driven: bool) -> Run
 where
-    P: ControlAffine<4, 2> + Clone + Send + 'static,
+    P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
 {
     let mut filter = filter(plant, bounds).with_plans(STEP).expect("a filter that can be assured");
     let heading = Heading { speed_limit: 6.0, ..Heading::towards(GOAL.0) };

@@ -89,8 +89,8 @@ impl Case {
     /// What the filter says: nothing if it accepts.
     fn refused(&self) -> Option<Failure> {
         let goal = DistanceDisc::new([0.0; 2], RADIUS, RADIUS).expect("valid disc");
-        let filter = Filter::builder(4, 2)
-            .barrier("goal", PointMass, goal, BarrierSettings::within(self.deadline))
+        let filter = Filter::builder(PointMass)
+            .barrier("goal", goal, BarrierSettings::within(self.deadline))
             .and_then(|b| b.bounds(&[-self.bound; 2], &[self.bound; 2]))
             .and_then(|b| b.sampling(Sampling::Measured { first: Some(self.period) }))
             .and_then(FilterBuilder::build)

@@ -169,7 +169,7 @@ impl Case {
 
     pub(crate) fn filter(&self) -> Filter {
         let inputs = self.plant.inputs();
-        let mut builder = Filter::builder(self.plant.states(), inputs);
+        let mut builder = Filter::from_sources(self.plant.states(), inputs);
         for set in &self.sets {
             let source = self.plant.source(&set.shape);
             builder = builder.source("set", source, set.settings()).expect("valid settings");

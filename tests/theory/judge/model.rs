@@ -1,5 +1,7 @@
 //! The plants and sets of the judge: as the filter gets them, and once more in plain numbers.
 
+use std::sync::Arc;
+
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, Outside, QuadraticDisc};
 use punctual_core::dynamics::ControlAffine;
@@ -229,14 +231,14 @@ impl<const N: usize> Barrier<N> for Line {
 
 fn chain(n: usize, line: Line) -> Box<dyn DerivativeSource> {
     let source = match n {
-        1 => lie::along(Chain::<1>, line, 1),
-        2 => lie::along(Chain::<2>, line, 2),
-        3 => lie::along(Chain::<3>, line, 3),
-        4 => lie::along(Chain::<4>, line, 4),
-        5 => lie::along(Chain::<5>, line, 5),
-        6 => lie::along(Chain::<6>, line, 6),
-        7 => lie::along(Chain::<7>, line, 7),
-        _ => lie::along(Chain::<8>, line, 8),
+        1 => lie::along(Arc::new(Chain::<1>), line, 1),
+        2 => lie::along(Arc::new(Chain::<2>), line, 2),
+        3 => lie::along(Arc::new(Chain::<3>), line, 3),
+        4 => lie::along(Arc::new(Chain::<4>), line, 4),
+        5 => lie::along(Arc::new(Chain::<5>), line, 5),
+        6 => lie::along(Arc::new(Chain::<6>), line, 6),
+        7 => lie::along(Arc::new(Chain::<7>), line, 7),
+        _ => lie::along(Arc::new(Chain::<8>), line, 8),
     };
     source.expect("a relative degree")
 }
@@ -256,15 +258,15 @@ impl Barrier<5> for Angle {
 
 fn steered<P>(plant: P, shape: &Shape) -> Box<dyn DerivativeSource>
 where
-    P: ControlAffine<5, 2> + Send + 'static,
+    P: ControlAffine<5, 2> + Send + Sync + 'static,
 {
     let &Shape::Angle { sign, limit } = shape else { return disc(plant, shape) };
-    lie::along(plant, Angle { sign, limit }, 1).expect("a relative degree")
+    lie::along(Arc::new(plant), Angle { sign, limit }, 1).expect("a relative degree")
 }
 
 fn disc<P, const N: usize>(plant: P, shape: &Shape) -> Box<dyn DerivativeSource>
 where
-    P: ControlAffine<N, 2> + Send + 'static,
+    P: ControlAffine<N, 2> + Send + Sync + 'static,
 {
     let &Shape::Disc { start, velocity, radius, smoothing, outside } = shape else {
         panic!("no set of a vehicle: {shape:?}")
@@ -272,10 +274,18 @@ where
     let source = if let Some(smoothing) = smoothing {
         let disc = DistanceDisc::new(start, radius, smoothing).and_then(|d| d.moving(velocity));
         let disc = disc.expect("valid disc");
-        if outside { lie::along(plant, Outside(disc), 2) } else { lie::along(plant, disc, 2) }
+        if outside {
+            lie::along(Arc::new(plant), Outside(disc), 2)
+        } else {
+            lie::along(Arc::new(plant), disc, 2)
+        }
     } else {
         let disc = QuadraticDisc::new(start, radius).and_then(|d| d.moving(velocity)).expect("valid disc");
-        if outside { lie::along(plant, Outside(disc), 2) } else { lie::along(plant, disc, 2) }
+        if outside {
+            lie::along(Arc::new(plant), Outside(disc), 2)
+        } else {
+            lie::along(Arc::new(plant), disc, 2)
+        }
     };
     source.expect("a relative degree")
 }

@@ -29,7 +29,7 @@ use super::rows::{BarrierSlot, Rows};
 use super::{Begin, End, Filter, FilterState, NoDerivative, SampleDerivative};
 use crate::MAX_INPUTS;
 use crate::error::{Error, ErrorKind, positive};
-use crate::lie::Direction;
+use crate::lie::{Direction, SharedPlant};
 use crate::plan::{BackupPlan, Policy};
 use crate::qp::Bounds;
 use choice::Piece;
@@ -153,8 +153,8 @@ impl Filter {
     /// # use punctual_core::{barriers::DistanceDisc, filter::*};
     /// # use punctual_core::plants::Unicycle;
     /// let goal = DistanceDisc::new([20.0, 10.0], 2.0, 1.0)?;
-    /// let mut filter = Filter::builder(4, 2)
-    ///     .barrier("goal", Unicycle, goal, BarrierSettings::within(8.0))?
+    /// let mut filter = Filter::builder(Unicycle)
+    ///     .barrier("goal", goal, BarrierSettings::within(8.0))?
     ///     .bounds(&[-5.0, -2.0], &[5.0, 2.0])?
     ///     .sampling(Sampling::Period(0.02))?
     ///     .build()?
@@ -225,7 +225,7 @@ impl Filter {
                 refuse("source", message.into());
             }
         }
-        found.extend(one_plant(rows, plans.period).err());
+        found.extend(one_plant(rows).err());
         found
     }
 
@@ -425,34 +425,19 @@ fn leaves(slot: &BarrierSlot, states: usize) -> bool {
     })
 }
 
-/// Checks at a few states that every barrier predicts the same plant: one plan serves all of them.
-fn one_plant(rows: &Rows, period: f64) -> Result<(), Error> {
-    /// Number of states at which the plants are compared.
-    const TRIALS: usize = 4;
-    let (nx, nu) = (rows.state_dim, rows.input_dim);
-    let moved = |slot: &BarrierSlot, trial: usize| {
-        let mut x: Vec<f64> = (0..nx).map(|i| trial_state(i, trial)).collect();
-        let u: Vec<f64> = (0..nu).map(|i| rows.bounds.clamp(i, trial_state(i + nx, trial))).collect();
-        if let Some(plant) = slot.source.predict() {
-            plant.flow(&mut x, &u, period);
-        }
-        x
-    };
+/// Checks that all barriers are along one plant: one plan serves all of them.
+fn one_plant(rows: &Rows) -> Result<(), Error> {
+    let plant = |slot: &BarrierSlot| slot.source.shared().map(SharedPlant::plant);
     let mut modelled = rows.slots.iter().filter(|slot| slot.source.predict().is_some());
     let Some(first) = modelled.next() else { return Ok(()) };
-    for slot in modelled {
-        for trial in 0..TRIALS {
-            let ends = [moved(first, trial), moved(slot, trial)];
-            let same =
-                |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-9 * (1.0 + a.abs()) || a.is_nan() && b.is_nan();
-            if !ends[0].iter().zip(&ends[1]).all(same) {
-                let message = format!(
-                    "moves the state differently from that of {}; a plan needs one plant for all barriers",
-                    first.name
-                );
-                return Err(Error::new(ErrorKind::Unsupported, "source", message).within(&slot.name));
-            }
+    match modelled.find(|slot| plant(slot).is_none() || plant(slot) != plant(first)) {
+        None => Ok(()),
+        Some(slot) => {
+            let message = format!(
+                "is along another plant than that of {}; a plan needs one plant for all barriers",
+                first.name
+            );
+            Err(Error::new(ErrorKind::Unsupported, "source", message).within(&slot.name))
         }
     }
-    Ok(())
 }

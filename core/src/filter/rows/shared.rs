@@ -3,11 +3,11 @@
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
-use core::any::Any;
+use core::any::{Any, TypeId};
 
 use super::slot::BarrierSlot;
 use crate::MAX_INPUTS;
-use crate::lie::{Ahead, DerivativeSource, Derivatives, SharedPlant};
+use crate::lie::{Ahead, DerivativeSource, Derivatives, PlantId, SharedPlant};
 
 /// The evaluations of one plant at the present sample.
 struct Plant {
@@ -22,8 +22,7 @@ struct Plant {
 }
 
 impl Plant {
-    fn new(source: &dyn SharedPlant) -> Self {
-        let [motion, ahead] = source.rooms();
+    fn new([motion, ahead]: Memories) -> Self {
         Self { motion, is_moving: false, ahead, input: [0.0; MAX_INPUTS], duration: None }
     }
 
@@ -36,6 +35,28 @@ impl Plant {
         }
         same
     }
+}
+
+/// Two memories, for [`SharedPlant::motion`] and [`SharedPlant::motion_ahead`].
+type Memories = [Box<dyn Any + Send>; 2];
+
+/// What sources have in common that share memories.
+#[derive(PartialEq)]
+struct Key {
+    plant: PlantId,
+    relative_degree: usize,
+    memories: [TypeId; 2],
+}
+
+/// The key of a source, and its memories.
+fn key(source: &dyn DerivativeSource) -> Option<(Key, Memories)> {
+    let shared = source.shared()?;
+    let memories = shared.rooms();
+    let types = memories.each_ref().map(|memory| (**memory).type_id());
+    Some((
+        Key { plant: shared.plant(), relative_degree: source.relative_degree(), memories: types },
+        memories,
+    ))
 }
 
 /// The source of a barrier, and the number of its plant.
@@ -52,15 +73,12 @@ impl SharedPlants {
             let (before, rest) = slots.split_at_mut(i);
             let slot = &mut rest[0];
             slot.plant = None;
-            let Some(source) = slot.source.shared() else { continue };
-            let n = slot.source.relative_degree();
-            let is_same = |other: &&mut BarrierSlot| {
-                let plant = other.source.shared().map(SharedPlant::plant);
-                other.source.relative_degree() == n && plant.is_some_and(|plant| source.shares(plant))
-            };
+            let Some((key, memories)) = key(&*slot.source) else { continue };
+            let is_same =
+                |other: &&mut BarrierSlot| self::key(&*other.source).is_some_and(|(other, _)| other == key);
             if let Some(other) = before.iter_mut().find(is_same) {
                 let number = *other.plant.get_or_insert_with(|| {
-                    plants.push(Plant::new(source));
+                    plants.push(Plant::new(memories));
                     plants.len() - 1
                 });
                 slot.plant = Some(number);
