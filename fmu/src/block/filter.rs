@@ -249,7 +249,7 @@ impl Block for FilterBlock {
                     Some(self.configuration.refusal(failure))
                 }
                 Some(failure) => Some(self.configuration.failure(failure)),
-                None => self.configuration.unaccounted(),
+                None => self.configuration.unaccounted(&self.filter),
             };
             let why = why.map(|why| format!(": {why}")).unwrap_or_default();
             format!("the guarantee is {} ({}){why}", status.name(), status.meaning())

@@ -8,6 +8,7 @@ mod adding;
 mod alone;
 mod angle;
 mod apart;
+mod assurance;
 mod barrier;
 mod controller;
 mod external;
