@@ -106,30 +106,28 @@ pub struct FilterConfiguration {
     /// Whether the filter promises only what a plan keeps.
     #[serde(skip_serializing_if = "is_auto")]
     pub assurance: AssuranceName,
-    /// The time in s, > 0, for which a plan has to reach past the last deadline and the sample where none ends at an
+    /// The time in s for which a plan has to reach past the last deadline and the sample where none ends at an
     /// equilibrium; `None`: every plan has to end at an equilibrium.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plan_horizon: Option<f64>,
-    /// The most quadratic programs of a search for a plan at one sample after the first, ≥ 1; `None`:
+    /// The most quadratic programs of a search for a plan at one sample after the first; `None`:
     /// [`Plans::SEARCH_BUDGET`](punctual_core::filter::Plans::SEARCH_BUDGET).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub search_budget: Option<u32>,
     /// What was found out when the file was read.
     #[serde(skip)]
     pub(super) findings: Findings,
-    /// Time in s until a computed input acts, ≥ 0, at most the step size: a communication step with a
-    /// Jacobi master. The state is predicted over it.
+    /// Time in s until a computed input acts, such as a communication step with a Jacobi master. The state is predicted over it.
     pub actuation_delay: f64,
-    /// The longest time in s between two steps, ≥ 0. The promises then hold for steps of any length up to it. 0:
-    /// as long as the steps before were.
+    /// The longest time in s between two steps. The promises then hold for steps of any length up to it. 0: as long as the
+    /// steps before were.
     #[serde(skip_serializing_if = "is_zero")]
     pub period_max: f64,
-    /// The time in s from the first step until the filter is armed, ≥ 0: every deadline counts from then. Before, nothing is
+    /// The time in s from the first step until the filter is armed: every deadline counts from then. Before, nothing is
     /// asked or promised.
     #[serde(skip_serializing_if = "is_zero")]
     pub arm_after: f64,
-    /// Largest ‖u − u_ref‖ of one sample, in units of u, > 0; a constraint that needs more is
-    /// reported as `no_authority`.
+    /// Largest ‖u − u_ref‖ of one sample, in units of u; a constraint that needs more is reported as `no_authority`.
     pub correction_limit: f64,
     /// The plant that the filter is for.
     pub plant: PlantSection,
@@ -144,8 +142,8 @@ pub struct FilterConfiguration {
     pub barrier: Vec<BarrierSection>,
     /// Input bounds by name, `[min, max]` in the unit of the input; none is ±1e30.
     pub bounds: BTreeMap<String, [f64; 2]>,
-    /// Bounds on the errors of the measured states, by name, in their units; ≥ 0. The promises then hold for the true
-    /// state, to first order in them.
+    /// Bounds on the errors of the measured states, by name, in their units. The promises then hold for the true state, to first
+    /// order in them.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub measurement_errors: BTreeMap<String, f64>,
     /// The run that it is meant for.
@@ -275,9 +273,9 @@ pub(super) static SECTION: Section = Section {
             ),
             Key::new(
                 "correction_limit",
-                Number(Of("unit of u"), Range::FINITE),
+                Number(Of("unit of u"), Range::POSITIVE),
                 Some("1e6"),
-                "> 0: a sample that needs a larger ‖u − u_ref‖ is `no_authority`",
+                "a sample that needs a larger ‖u − u_ref‖ is `no_authority`",
             ),
             Key::new("experiment", Table(&EXPERIMENT), Some(""), "[the run it is meant for](#runs)"),
             Key::new(

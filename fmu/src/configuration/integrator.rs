@@ -13,19 +13,20 @@ use super::{ConfigurationError, Parameter, PlantSection, Range, UNBOUNDED};
 
 /// `[integrator]`: dynamic extension inside the filter. The plant outside has this state of the filter's model for its
 /// input; the filter solves for its rate and integrates that itself ([`Filter`]).
+/// docs/configuration.md has ranges and defaults.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct IntegratorSection {
     /// The integrated state: one whose derivative is an input alone, such as `beta` of `bicycle_small_slip_rate`.
     /// Bounds of that input bound the rate.
     pub state: String,
-    /// Rate in 1/s, > 0, at which it follows `u_ref.<state>` where no constraint is in the way. Default 2.
+    /// Rate in 1/s at which it follows `u_ref.<state>` where no constraint is in the way.
     #[serde(default = "gain")]
     pub gain: f64,
-    /// Its smallest value, in its unit. Default: none (-1e30).
+    /// Its smallest value, in its unit; none is -1e30.
     #[serde(default = "none_below")]
     pub min: f64,
-    /// Its largest value. Default: none (1e30).
+    /// Its largest value; none is 1e30.
     #[serde(default = "none_above")]
     pub max: f64,
 }
