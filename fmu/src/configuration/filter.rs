@@ -18,6 +18,7 @@ use super::key::{
 };
 use super::model::RawModel;
 use super::names::{Named, check_identifier, check_known, is_reserved, taken};
+pub(super) use super::parameter::UNBOUNDED;
 use super::words::words;
 use super::{
     BarrierInput, BarrierSection, ConfigurationError, DisturbanceSection, EXPERIMENT, ExperimentSection,
@@ -25,9 +26,6 @@ use super::{
     VariableSection, barrier, integrator, model, plant,
 };
 use crate::text::{number, quantity, shown_unit};
-
-/// Size from which an input bound means "no bound": a finite number that every importer can read.
-pub const UNBOUNDED: f64 = 1e30;
 
 words! {
     /// The treatment of inputs that are held between samples.

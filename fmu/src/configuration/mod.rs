@@ -35,11 +35,11 @@ pub use barrier::{
 pub use controller::{Controller, ControllerConfiguration, ControllerName};
 pub use external::BarrierInput;
 pub use file_kind::FileKind;
-pub use filter::{FilterConfiguration, SamplingName, UNBOUNDED};
+pub use filter::{FilterConfiguration, SamplingName};
 pub use integrator::IntegratorSection;
 pub use key::{Key, Section, Unit, Value};
 pub use model::{ExpressionSection, ParameterSection, PlantSection, VariableSection};
-pub use parameter::{Parameter, Range, updated};
+pub use parameter::{Parameter, Range, UNBOUNDED, updated};
 pub use plant::{DisturbanceSection, IntegrationSection, OutputSection, PlantConfiguration};
 pub use plugin::{Plugin, PluginDigest, PluginLoader, PluginSection};
 pub use punctual_models::{Functions, mentions, nearest};
