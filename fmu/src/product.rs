@@ -377,7 +377,7 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
     }
     let enumerated = |t: &str| VariableKind::enumeration(t);
     table.add("status".into(), "what u means", output, enumerated(STATUS));
-    for (barrier, degree) in c.barrier.iter().zip(c.relative_degrees()) {
+    for (barrier, &degree) in c.barrier.iter().zip(c.relative_degrees()) {
         let unit = &barrier.unit(&c.plant);
         for row in &BARRIER_OUTPUTS {
             let kind = match row.reading {

@@ -449,7 +449,7 @@ fn filter(
                 let plans = plans.map(|w| (w.keeps(name), w.earliest_deadline(name)));
                 let run = closed_loop.as_ref().filter(|run| !run.by_rows && c.run.simulated.is_none());
                 let arrival = run.and_then(|run| run.arrival(i, experiment.start_time));
-                Some(closed_loop::reach(c, (i, deadline), (x0, wanted), plans, arrival)?)
+                Some(closed_loop::reach((c, &rows), (i, deadline), (x0, wanted), plans, arrival)?)
             }
             _ => None,
         };

@@ -422,11 +422,11 @@ fn deadlines(c: &FilterConfiguration) -> Vec<f64> {
     c.barrier.iter().map(|b| b.deadline.unwrap_or(f64::INFINITY)).collect()
 }
 
-/// Limits that the bounds set to barrier `index`, of that deadline, from `x0`. `plans`: where they are followed, whether there
+/// Limits that the bounds set to barrier `index`, of that deadline, from `x0`; `rows` is the filter of `c`. `plans`: where they are followed, whether there
 /// is one for this deadline, and the earliest for which there is. `arrival`: when the closed loop that keeps everything is
 /// there.
 pub(super) fn reach(
-    c: &FilterConfiguration,
+    (c, rows): (&FilterConfiguration, &Filter),
     (index, deadline): (usize, f64),
     (x0, wanted): (&[f64], &Wanted),
     plans: Option<(bool, Option<f64>)>,
@@ -437,11 +437,10 @@ pub(super) fn reach(
         (None, Some(_)) => (arrival, true),
         _ => (most, false),
     };
-    let filter = c.build()?;
     let t = c.experiment.start_time;
     let horizon = HORIZON * deadline;
-    let earliest = filter.earliest_arrival(index, t, x0, horizon).map_err(Error::from)?;
-    let lost = filter.is_ruled_out(index, t, x0, deadline).map_err(Error::from)?;
+    let earliest = rows.earliest_arrival(index, t, x0, horizon).map_err(Error::from)?;
+    let lost = rows.is_ruled_out(index, t, x0, deadline).map_err(Error::from)?;
     if let Some((found, earliest_at_most)) = plans {
         let deadline = match () {
             () if found => Verdict::CanBeMet,

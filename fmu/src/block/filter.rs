@@ -16,6 +16,8 @@ pub(super) struct FilterBlock {
     /// The outputs that are enumerations; their codes follow the parameters.
     enumerated: Vec<usize>,
     filter: Filter,
+    /// The parameters that the filter was built with, and its state before the first step.
+    built: (Vec<f64>, FilterState),
     /// `rearm` at the last step: a rising edge re-arms.
     rearm_seen: bool,
     /// The status of the guarantee that was last logged.
@@ -33,11 +35,25 @@ impl FilterBlock {
     ) -> Result<Self, ConfigurationError> {
         let (layout, enumerated) = (product.layout, product.enumerated().collect());
         let (parameters, filter) = (configuration.parameters(), configuration.build_loop()?);
+        let mut numbered = configuration.clone();
+        let numbers = parameters.iter().map(|row| row.get(&mut numbered)).collect();
         let kept = filter.state().clone();
+        let built = (numbers, kept.clone());
         let change = SampleDerivative::default();
         let noticed = None;
         let rearm_seen = false;
-        Ok(Self { configuration, parameters, layout, enumerated, filter, rearm_seen, noticed, kept, change })
+        Ok(Self {
+            configuration,
+            parameters,
+            layout,
+            enumerated,
+            filter,
+            built,
+            rearm_seen,
+            noticed,
+            kept,
+            change,
+        })
     }
 
     fn rearm_index(&self) -> usize {
@@ -152,9 +168,16 @@ impl FilterBlock {
 impl Block for FilterBlock {
     fn configure(&mut self, values: &Values) -> Result<(), ConfigurationError> {
         let numbers = &values.reals[self.layout.parameters..self.layout.end];
-        let configuration = updated(&self.configuration, &self.parameters, numbers)?;
-        self.filter = configuration.build_loop()?;
-        self.configuration = configuration;
+        let (before, start) = &self.built;
+        if numbers.iter().zip(before).all(|(a, b)| a.to_bits() == b.to_bits()) {
+            let restored = self.filter.restore(start);
+            debug_assert!(restored.is_ok(), "{restored:?}");
+        } else {
+            let configuration = updated(&self.configuration, &self.parameters, numbers)?;
+            self.filter = configuration.build_loop()?;
+            self.configuration = configuration;
+            self.built = (numbers.to_vec(), self.filter.state().clone());
+        }
         (self.rearm_seen, self.noticed) = (false, None);
         self.kept.clone_from(self.filter.state());
         Ok(())
@@ -249,7 +272,7 @@ impl Block for FilterBlock {
                     Some(self.configuration.refusal(failure))
                 }
                 Some(failure) => Some(self.configuration.failure(failure)),
-                None => self.configuration.unaccounted(),
+                None => self.configuration.unaccounted(&self.filter),
             };
             let why = why.map(|why| format!(": {why}")).unwrap_or_default();
             format!("the guarantee is {} ({}){why}", status.name(), status.meaning())
@@ -265,6 +288,7 @@ impl Block for FilterBlock {
             parameters: _,
             layout: _,
             enumerated: _,
+            built: _,
             noticed: _,
             kept: _,
             change: _,

@@ -12,9 +12,9 @@ use super::{
 /// What a run of a filter's file alone has besides the filter.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RunSection {
-    /// Initial value of each state of the plant, in its unit; finite. Default: 0, or nearest to it in the state's range.
+    /// Initial value of each state of the plant, in its unit. A state without one starts at 0, or nearest to it in its range.
     pub x0: BTreeMap<String, f64>,
-    /// An expression of states, parameters and time for each input, by name. Default: 0.
+    /// An expression of states, parameters and time for each input, by name.
     pub u_ref: Option<BTreeMap<String, String>>,
     /// The plant, where it is not the filter's model.
     pub simulated: Option<PlantSection>,

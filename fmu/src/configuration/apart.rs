@@ -5,8 +5,7 @@ use punctual_core::elementary;
 use punctual_core::plan::Failure;
 
 use super::barrier::Shape;
-use super::filter::UNBOUNDED;
-use super::{BarrierSection, FilterConfiguration};
+use super::{BarrierSection, FilterConfiguration, UNBOUNDED};
 
 /// By how much sets have to be apart, as a part of their size, to be so for certain.
 const ROUND_OFF: f64 = 1e-9;

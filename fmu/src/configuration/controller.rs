@@ -251,7 +251,7 @@ fn yes() -> bool {
 pub enum Controller {
     /// [`damping`](punctual_reference::nominal::damping).
     Damping {
-        /// In 1/s, > 0.
+        /// In 1/s.
         gain: f64,
     },
     /// [`Heading`] to one goal.
@@ -266,7 +266,7 @@ pub enum Controller {
     Waypoints {
         /// The points in m, in order, at least one.
         points: Vec<[f64; 2]>,
-        /// Distance in m within which a point counts as reached, > 0.
+        /// Distance in m within which a point counts as reached.
         acceptance_radius: f64,
         /// The way to a point, which takes the place of the goal.
         drive: Heading,

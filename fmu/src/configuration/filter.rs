@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 
 use punctual_core::MAX_ROWS;
 use punctual_core::filter::{Begin, End, Filter, FilterBuilder, Sampling, Strictness};
-use punctual_core::lie::RelativeDegree;
-use punctual_core::plan::{Failure, Names};
+use punctual_core::plan::Names;
 use serde::{Deserialize, Serialize};
 
 use super::adding::{Adding, Forms, MixedDegree, not_affine};
 use super::alone::within;
+use super::assurance::{AssuranceName, Findings};
 use super::barrier::RawBarrier;
 use super::key::{
     Key, Section,
@@ -18,6 +18,7 @@ use super::key::{
 };
 use super::model::RawModel;
 use super::names::{Named, check_identifier, check_known, is_reserved, taken};
+pub(super) use super::parameter::UNBOUNDED;
 use super::words::words;
 use super::{
     BarrierInput, BarrierSection, ConfigurationError, DisturbanceSection, EXPERIMENT, ExperimentSection,
@@ -25,9 +26,6 @@ use super::{
     VariableSection, barrier, integrator, model, plant,
 };
 use crate::text::{number, quantity, shown_unit};
-
-/// Size from which an input bound means "no bound": a finite number that every importer can read.
-pub const UNBOUNDED: f64 = 1e30;
 
 words! {
     /// The treatment of inputs that are held between samples.
@@ -40,35 +38,6 @@ words! {
         /// [`Sampling::Period`] with the step size of `[experiment]`.
         StepSize = "step_size",
     }
-}
-
-words! {
-    /// Whether the filter promises only what a plan keeps.
-    pub enum AssuranceName {
-        /// A plan behind every input, where all inputs have bounds and plans account for everything; else the rows alone, with a
-        /// warning where only the latter fails.
-        Auto = "auto",
-        /// The rows alone ([`Filter`]).
-        Off = "off",
-        /// A plan behind every input ([`Filter`](punctual_core::filter::Filter)).
-        On = "on",
-    }
-}
-
-/// Why a filter follows no plans: the rows act alone.
-#[derive(Clone, Debug, PartialEq)]
-enum RowsOnly {
-    /// The file asks for it.
-    Off,
-    /// A signal that has not both bounds, in words.
-    Unbounded(String),
-    /// What the file declares and no plan accounts for, each with its key, in words.
-    Unaccounted(Vec<String>),
-}
-
-/// Obstacles in one sentence.
-pub(super) fn listed(obstacles: &[String]) -> String {
-    obstacles.join("; ")
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
@@ -135,30 +104,28 @@ pub struct FilterConfiguration {
     /// Whether the filter promises only what a plan keeps.
     #[serde(skip_serializing_if = "is_auto")]
     pub assurance: AssuranceName,
-    /// The time in s, > 0, for which a plan has to reach past the last deadline and the sample where none ends at an
+    /// The time in s for which a plan has to reach past the last deadline and the sample where none ends at an
     /// equilibrium; `None`: every plan has to end at an equilibrium.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub plan_horizon: Option<f64>,
-    /// The most quadratic programs of a search for a plan at one sample after the first, ≥ 1; `None`:
+    /// The most quadratic programs of a search for a plan at one sample after the first; `None`:
     /// [`Plans::SEARCH_BUDGET`](punctual_core::filter::Plans::SEARCH_BUDGET).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub search_budget: Option<u32>,
-    /// Why no plan is followed, with the file as it is; `None` where plans are.
+    /// What was found out when the file was read.
     #[serde(skip)]
-    rows_only: Option<RowsOnly>,
-    /// Time in s until a computed input acts, ≥ 0, at most the step size: a communication step with a
-    /// Jacobi master. The state is predicted over it.
+    pub(super) findings: Findings,
+    /// Time in s until a computed input acts, such as a communication step with a Jacobi master. The state is predicted over it.
     pub actuation_delay: f64,
-    /// The longest time in s between two steps, ≥ 0. The promises then hold for steps of any length up to it. 0:
-    /// as long as the steps before were.
+    /// The longest time in s between two steps. The promises then hold for steps of any length up to it. 0: as long as the
+    /// steps before were.
     #[serde(skip_serializing_if = "is_zero")]
     pub period_max: f64,
-    /// The time in s from the first step until the filter is armed, ≥ 0: every deadline counts from then. Before, nothing is
+    /// The time in s from the first step until the filter is armed: every deadline counts from then. Before, nothing is
     /// asked or promised.
     #[serde(skip_serializing_if = "is_zero")]
     pub arm_after: f64,
-    /// Largest ‖u − u_ref‖ of one sample, in units of u, > 0; a constraint that needs more is
-    /// reported as `no_authority`.
+    /// Largest ‖u − u_ref‖ of one sample, in units of u; a constraint that needs more is reported as `no_authority`.
     pub correction_limit: f64,
     /// The plant that the filter is for.
     pub plant: PlantSection,
@@ -173,8 +140,8 @@ pub struct FilterConfiguration {
     pub barrier: Vec<BarrierSection>,
     /// Input bounds by name, `[min, max]` in the unit of the input; none is ±1e30.
     pub bounds: BTreeMap<String, [f64; 2]>,
-    /// Bounds on the errors of the measured states, by name, in their units; ≥ 0. The promises then hold for the true
-    /// state, to first order in them.
+    /// Bounds on the errors of the measured states, by name, in their units. The promises then hold for the true state, to first
+    /// order in them.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub measurement_errors: BTreeMap<String, f64>,
     /// The run that it is meant for.
@@ -304,9 +271,9 @@ pub(super) static SECTION: Section = Section {
             ),
             Key::new(
                 "correction_limit",
-                Number(Of("unit of u"), Range::FINITE),
+                Number(Of("unit of u"), Range::POSITIVE),
                 Some("1e6"),
-                "> 0: a sample that needs a larger ‖u − u_ref‖ is `no_authority`",
+                "a sample that needs a larger ‖u − u_ref‖ is `no_authority`",
             ),
             Key::new("experiment", Table(&EXPERIMENT), Some(""), "[the run it is meant for](#runs)"),
             Key::new(
@@ -395,7 +362,7 @@ impl FilterConfiguration {
             assurance: raw.assurance,
             plan_horizon: raw.plan_horizon,
             search_budget: raw.search_budget,
-            rows_only: None,
+            findings: Findings::default(),
             actuation_delay: raw.actuation_delay,
             period_max: raw.period_max,
             arm_after: raw.arm_after,
@@ -433,18 +400,8 @@ impl FilterConfiguration {
         }
         configuration.check_horizon()?;
         configuration.check_budget()?;
-        configuration.rows_only = configuration.rows_only();
-        for (key, is_given) in [
-            ("policy", configuration.policy.is_some()),
-            ("plan_horizon", configuration.plan_horizon.is_some()),
-            ("search_budget", configuration.search_budget.is_some()),
-        ] {
-            if is_given && !configuration.is_assured() {
-                let message = format!("is for plans, of which there are none: {}", configuration.unassured());
-                return Err(ConfigurationError::new(key, message));
-            }
-        }
-        let filter = configuration.build_loop()?;
+        let rows = configuration.examine()?;
+        let filter = configuration.completed(rows)?;
         configuration.check_margins(&filter)?;
         if *configuration.run != RunSection::default() {
             configuration.alone()?;
@@ -546,12 +503,10 @@ impl FilterConfiguration {
                 move |c: &mut Self| c.measurement_errors.get_mut(&state.name),
             ));
         }
-        rows.extend(self.integrator.iter().flat_map(|i| i.parameters(&self.plant)));
-        // Only a disturbance has a unit that depends on the degrees.
-        let disturbed = self.barrier.iter().any(|b| b.disturbance.is_some());
-        let degrees = if disturbed { self.relative_degrees() } else { Vec::new() };
+        let integrator = self.integrator.iter();
+        rows.extend(integrator.flat_map(|i| i.parameters(&self.plant, |c: &mut Self| c.integrator.as_mut())));
         for (i, barrier) in self.barrier.iter().enumerate() {
-            rows.extend(barrier.parameters(i, &self.plant, degrees.get(i).copied()));
+            rows.extend(barrier.parameters(i, &self.plant, self.relative_degrees().get(i).copied()));
         }
         rows.extend(self.plant.parameters(|c: &mut Self| &mut c.plant));
         // After all others, which kept their value references.
@@ -578,15 +533,6 @@ impl FilterConfiguration {
     /// A number outside its range, or a lower input bound above its upper bound.
     pub fn build(&self) -> Result<Filter, ConfigurationError> {
         self.built(if self.is_assured() { MixedDegree::Taken } else { MixedDegree::Refused })
-    }
-
-    /// The barriers, by their index, whose inputs enter at different orders, with what was found: only plans move them all.
-    pub fn mixed_degree(&self) -> Vec<(usize, RelativeDegree)> {
-        let mut mixed_degree = Vec::new();
-        match self.built(MixedDegree::Reported(&mut mixed_degree)) {
-            Ok(_) => mixed_degree,
-            Err(_) => Vec::new(),
-        }
     }
 
     /// The filter, with what becomes of barriers whose inputs enter at different orders.
@@ -655,11 +601,6 @@ impl FilterConfiguration {
             .map_err(|e| ConfigurationError::new(e.field(), e.message()))
     }
 
-    /// The relative degree of each barrier; none for a configuration that cannot be built.
-    pub fn relative_degrees(&self) -> Vec<usize> {
-        self.build().map(|filter| filter.relative_degrees().collect()).unwrap_or_default()
-    }
-
     /// The same filter, armed at its first step.
     #[must_use]
     pub fn armed_at_once(mut self) -> Self {
@@ -667,79 +608,51 @@ impl FilterConfiguration {
         self
     }
 
-    /// Whether the filter follows plans.
-    pub fn is_assured(&self) -> bool {
-        self.rows_only.is_none()
-    }
-
-    /// Whether its plans may end in motion, so that it reports until when it promises.
-    pub fn ends_plans(&self) -> bool {
-        self.is_assured() && self.plan_horizon.is_some()
-    }
-
-    /// Why the filter follows no plans, in words; empty where it does.
-    pub fn unassured(&self) -> String {
-        match &self.rows_only {
-            None => String::new(),
-            Some(RowsOnly::Off) => "assurance is \"off\"".to_owned(),
-            Some(RowsOnly::Unbounded(signal)) => signal.clone(),
-            Some(RowsOnly::Unaccounted(obstacles)) => listed(obstacles),
-        }
-    }
-
-    /// What the user has to know of the file: that something in it switches plans off, though every input has bounds and
-    /// nobody asked for that.
-    pub fn warning(&self) -> Option<String> {
-        let Some(RowsOnly::Unaccounted(obstacles)) = &self.rows_only else { return None };
-        let names: Vec<_> = self.barrier.iter().map(|barrier| barrier.name.as_str()).collect();
-        Some(format!(
-            "plans are off, and with them the guarantee of {}: {}. The rows act alone. `assurance = \"on\"` makes this an \
-             error, `assurance = \"off\"` accepts it",
-            names.join(", "),
-            listed(obstacles)
-        ))
-    }
-
-    fn rows_only(&self) -> Option<RowsOnly> {
-        let free = self.commanded().into_iter().find(|signal| self.limits(&signal.name).is_none());
-        match (self.assurance, free) {
-            (AssuranceName::Off, _) => Some(RowsOnly::Off),
-            (AssuranceName::On, _) => None,
-            (AssuranceName::Auto, Some(signal)) => {
-                Some(RowsOnly::Unbounded(format!("{0} has {1}", signal.name, self.lacking(&signal.name))))
-            }
-            (AssuranceName::Auto, None) => {
-                let obstacles = self.obstacles();
-                (!obstacles.is_empty()).then_some(RowsOnly::Unaccounted(obstacles))
-            }
-        }
-    }
-
-    /// What no plan accounts for, each with its key, in words.
-    fn obstacles(&self) -> Vec<String> {
-        match self.built(MixedDegree::Taken) {
-            Ok(filter) => self.obstacles_of(&filter),
-            Err(error) => vec![error.to_string()],
-        }
-    }
-
-    /// What no plan accounts for, in words.
-    pub fn unaccounted(&self) -> Option<String> {
-        Some(self.obstacles()).filter(|obstacles| !obstacles.is_empty()).map(|obstacles| listed(&obstacles))
-    }
-
-    /// What keeps a plan from being one, in words.
-    pub fn failure(&self, failure: Failure) -> String {
-        match (failure, self.plan_horizon) {
-            (Failure::NoRest, None) => format!("{failure}; with `plan_horizon` a plan may end in motion"),
-            (Failure::NoRest, Some(_)) => "no plan reaches as far as plan_horizon".to_owned(),
-            _ => failure.named(self).to_string(),
-        }
-    }
-
     /// Whether an input has a bound.
     pub fn is_bounded(&self) -> bool {
         self.bounds.values().any(|[min, max]| *min > -UNBOUNDED || *max < UNBOUNDED)
+    }
+
+    /// The measured states: those of the plant but the integrated one.
+    pub fn measured_states(&self) -> Vec<VariableSection> {
+        let integrated = |s: &VariableSection| self.integrator.as_ref().is_some_and(|i| i.state == s.name);
+        self.plant.states().into_iter().filter(|s| !integrated(s)).collect()
+    }
+
+    /// Of the numbers `x`, one for each state of the plant, those that are [measured](Self::measured_states).
+    pub fn measured(&self, x: &[f64]) -> Vec<f64> {
+        let states = self.plant.states();
+        let is_measured = |name: &str| self.integrator.as_ref().is_none_or(|i| i.state != name);
+        x.iter().zip(states).filter(|(_, state)| is_measured(&state.name)).map(|(x, _)| *x).collect()
+    }
+
+    /// The bounds of a signal that the filter [hands out](Self::commanded), where it has both.
+    pub fn limits(&self, name: &str) -> Option<[f64; 2]> {
+        self.limits_given(name).filter(|limits| limits.iter().all(|limit| limit.abs() < UNBOUNDED))
+    }
+
+    /// What such a signal lacks of its bounds, in words.
+    pub(super) fn lacking(&self, name: &str) -> &'static str {
+        match self.limits_given(name).map(|limits| limits.map(|limit| limit.abs() < UNBOUNDED)) {
+            Some([true, false]) => "no upper bound",
+            Some([false, true]) => "no lower bound",
+            _ => "no bounds",
+        }
+    }
+
+    fn limits_given(&self, name: &str) -> Option<[f64; 2]> {
+        let integrator = self.integrator.as_ref().filter(|i| i.state == name);
+        integrator.map(IntegratorSection::limits).or(self.bounds.get(name).copied())
+    }
+
+    /// The signals that the filter hands out and is asked for: the inputs of the plant, the integrated state in
+    /// place of its rate.
+    pub fn commanded(&self) -> Vec<VariableSection> {
+        let mut inputs = self.plant.inputs();
+        if let Some((state, input)) = self.integrator.as_ref().and_then(|i| i.place(&self.plant).ok()) {
+            inputs[input] = self.plant.states().swap_remove(state);
+        }
+        inputs
     }
 
     /// The inputs that belong to barriers; they follow the states of the plant in the filter's.

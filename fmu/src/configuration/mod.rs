@@ -8,6 +8,7 @@ mod adding;
 mod alone;
 mod angle;
 mod apart;
+mod assurance;
 mod barrier;
 mod controller;
 mod external;
@@ -34,11 +35,11 @@ pub use barrier::{
 pub use controller::{Controller, ControllerConfiguration, ControllerName};
 pub use external::BarrierInput;
 pub use file_kind::FileKind;
-pub use filter::{FilterConfiguration, SamplingName, UNBOUNDED};
+pub use filter::{FilterConfiguration, SamplingName};
 pub use integrator::IntegratorSection;
 pub use key::{Key, Section, Unit, Value};
 pub use model::{ExpressionSection, ParameterSection, PlantSection, VariableSection};
-pub use parameter::{Parameter, Range, updated};
+pub use parameter::{Parameter, Range, UNBOUNDED, updated};
 pub use plant::{DisturbanceSection, IntegrationSection, OutputSection, PlantConfiguration};
 pub use plugin::{Plugin, PluginDigest, PluginLoader, PluginSection};
 pub use punctual_models::{Functions, mentions, nearest};
@@ -223,20 +224,21 @@ static EXPERIMENT: Section = Section {
 
 const STEP_SIZE: Value = Value::Number(Unit::Is("s"), Range::POSITIVE);
 
-/// `[experiment]`: the run that the FMU is meant for; importers take it as their default.
+/// `[experiment]`: the run that the FMU is meant for; importers take it as their default. docs/configuration.md has units,
+/// ranges and defaults.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ExperimentSection {
-    /// Start in s, finite. Default 0.
+    /// Start in s.
     pub start_time: f64,
-    /// Stop in s, finite, > start. Default 10.
+    /// Stop in s.
     pub stop_time: f64,
-    /// Communication step in s, finite, > 0. Default 0.001.
+    /// Communication step in s.
     pub step_size: f64,
-    /// The version of FMI. Default 2.0.
+    /// The version of FMI.
     #[serde(skip_serializing_if = "is_default")]
     pub fmi: FmiVersion,
-    /// Whether signals that belong together are one array, which FMI 3.0 alone has. Default: true.
+    /// Whether signals that belong together are one array, which FMI 3.0 alone has.
     #[serde(skip_serializing_if = "is_true")]
     pub arrays: bool,
 }

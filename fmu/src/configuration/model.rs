@@ -26,14 +26,14 @@ use super::{ConfigurationError, ModelName, Parameter, Range, ReferenceSection, c
 pub struct VariableSection {
     /// Its name, a C identifier, unique in the model.
     pub name: String,
-    /// Its unit, such as `m/s2` or `kg.m2/s`. Default `1`.
+    /// Its unit, such as `m/s2` or `kg.m2/s`.
     #[serde(default = "one")]
     pub unit: String,
-    /// Meaning, for a human. Default: none.
+    /// Meaning, for a human.
     #[serde(default)]
     pub description: String,
     /// Smallest value for which the model is meant. For an input it is the smallest value allowed, where
-    /// `[bounds]` says nothing. Default: none.
+    /// `[bounds]` says nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub min: Option<f64>,
     /// Largest value, likewise.
@@ -47,18 +47,18 @@ pub struct VariableSection {
 pub struct ParameterSection {
     /// Its name, a C identifier, unique in the model.
     pub name: String,
-    /// Its value, until an importer sets another one; finite, within the range.
+    /// Its value, until an importer sets another one.
     pub start: f64,
-    /// Its unit, such as `kg`. Default `1`.
+    /// Its unit, such as `kg`.
     #[serde(default = "one")]
     pub unit: String,
-    /// Meaning, for a human. Default: none.
+    /// Meaning, for a human.
     #[serde(default)]
     pub description: String,
-    /// Smallest value. Default: none.
+    /// Smallest value, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub min: Option<f64>,
-    /// Largest value. Default: none.
+    /// Largest value, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max: Option<f64>,
 }

@@ -4,6 +4,9 @@ use std::borrow::Cow;
 
 use super::ConfigurationError;
 
+/// Size from which an input bound means "no bound": a finite number that every importer can read.
+pub const UNBOUNDED: f64 = 1e30;
+
 /// The values a number may take.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {

@@ -113,10 +113,10 @@ pub struct OutputSection {
     /// Its value: an expression of states, parameters and the time `t`. Of the states as they are, without the disturbance of
     /// their measurement.
     pub expression: String,
-    /// Its unit. Default `1`.
+    /// Its unit.
     #[serde(default = "model::one")]
     pub unit: String,
-    /// Meaning, for a human. Default: none.
+    /// Meaning, for a human.
     #[serde(default)]
     pub description: String,
 }
@@ -125,8 +125,8 @@ pub struct OutputSection {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct IntegrationSection {
-    /// Largest Runge-Kutta step in s, finite, > 0. Default 0.001. A communication step h is divided
-    /// into the least number of equal steps that are not longer.
+    /// Largest Runge-Kutta step in s. A communication step h is divided into the least number of equal steps that are not
+    /// longer.
     pub inner_step: f64,
 }
 
@@ -152,17 +152,17 @@ impl IntegrationSection {
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct DisturbanceSection {
-    /// Seed of the sequence; finite, ≥ 0. Default 0.
+    /// Seed of the sequence.
     #[serde(default)]
     pub seed: f64,
-    /// Time in s for which a value lasts, > 0, counted from time 0. Default 0.01.
+    /// Time in s for which a value lasts, counted from time 0.
     #[serde(default = "hold")]
     pub period: f64,
-    /// Largest size of the disturbance of an input, by name, in its unit; ≥ 0. Default: nothing.
+    /// Largest size of the disturbance of an input, by name, in its unit.
     #[serde(default)]
     pub inputs: BTreeMap<String, f64>,
-    /// Largest size of the disturbance of an output `x.<state>`, by the name of the state, in its unit; ≥ 0. The
-    /// state itself stays as it is. Default: nothing.
+    /// Largest size of the disturbance of an output `x.<state>`, by the name of the state, in its unit. The state
+    /// itself stays as it is.
     #[serde(default)]
     pub measurements: BTreeMap<String, f64>,
 }
@@ -227,7 +227,7 @@ pub struct PlantConfiguration {
     /// Disturbances that the model does not know.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub disturbance: Option<DisturbanceSection>,
-    /// Initial value of each state, in its unit; finite.
+    /// Initial value of each state, in its unit.
     pub x0: BTreeMap<String, f64>,
     /// The run that it is meant for.
     pub experiment: ExperimentSection,

@@ -147,12 +147,12 @@ impl ReferenceSection {
         Ok(Self { model: raw.model, l_r, l_f })
     }
 
-    /// Distance in m from the rear axle to the centre of mass, > 0, of a bicycle.
+    /// Distance in m from the rear axle to the centre of mass, of a bicycle.
     pub fn l_r(&self) -> Option<f64> {
         self.model.has_l_r().then_some(self.l_r)
     }
 
-    /// Distance in m from the centre of mass to the front axle, > 0, of `bicycle_kinematic` and
+    /// Distance in m from the centre of mass to the front axle, of `bicycle_kinematic` and
     /// `bicycle_kinematic_angle`.
     pub fn l_f(&self) -> Option<f64> {
         self.model.has_l_f().then_some(self.l_f)

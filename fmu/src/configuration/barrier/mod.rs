@@ -92,7 +92,7 @@ pub struct BarrierSection {
     /// The set.
     #[serde(flatten)]
     pub shape: Shape,
-    /// Deadline T in s after the first step, > 0; none for a set that is only to be kept from a start inside it.
+    /// Deadline T in s after the first step; none for a set that is only to be kept from a start inside it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub deadline: Option<f64>,
     /// The method by which it is met.
@@ -103,37 +103,34 @@ pub struct BarrierSection {
     /// The reaction where the bounds certainly do not allow the deadline.
     #[serde(skip_serializing_if = "is_default")]
     pub when_infeasible: InfeasibleName,
-    /// Rate a of the profile method in 1/s, ≥ 0, at most 0.5 / step. Default: 20 / deadline, without a deadline
-    /// the rate at which the bounds can still stop.
+    /// Rate a of the profile method in 1/s.
     pub rate: Automatic,
-    /// Rates in 1/s, > 0, as many as the relative degree, in place of `rate`; else empty.
+    /// Rates in 1/s, as many as the relative degree, in place of `rate`; else empty.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub rates: Vec<f64>,
-    /// Rate of the stay constraint in 1/s, ≥ 0. Default: `rate`, or the default of `rate` where there are
-    /// `rates`.
+    /// Rate of the stay constraint in 1/s. Where there are `rates`, its default is that of `rate`.
     pub stay_rate: Automatic,
-    /// Margin μ in the unit of h, ≥ 0; the expected cost of held inputs is added.
+    /// Margin μ in the unit of h; the expected cost of held inputs is added.
     pub margin: f64,
-    /// Time in s to be inside again after leaving, ≥ 0; without it leaving is reported only.
+    /// Time in s to be inside again after leaving; without it leaving is reported only.
     pub recovery: Automatic,
-    /// Bound on the part of h⁽ⁿ⁾ that the model does not know (a disturbance), in the unit of h per sⁿ, ≥ 0. The
-    /// promise holds for all disturbances within it.
+    /// Bound on the part of h⁽ⁿ⁾ that the model does not know (a disturbance), in the unit of h per sⁿ. The promise
+    /// holds for all disturbances within it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub disturbance: Option<f64>,
-    /// Rank where not all barriers can be met: smaller numbers go first, of equal ones the one above. Default: 0
-    /// for a barrier whose set the start is in, 1 for the others.
+    /// Rank where not all barriers can be met: smaller numbers go first, of equal ones the one above.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub priority: Option<u32>,
-    /// Makes it soft: it is relaxed where it would cost more than this ‖u − u_ref‖, in units of u, > 0.
+    /// Makes it soft: it is relaxed where it would cost more than this ‖u − u_ref‖, in units of u.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub penalty: Option<f64>,
-    /// Time in s after the first step from which it is enforced, ≥ 0, < deadline if there is one.
+    /// Time in s after the first step from which it is enforced.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub begin: Option<f64>,
     /// The barrier, above in the file, whose arrival it waits for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub after: Option<String>,
-    /// Time in s after the first step at which it is released, > begin; 0: never.
+    /// Time in s after the first step at which it is released; none: never.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub end: Option<f64>,
     /// Whether it is released when it has been reached.
