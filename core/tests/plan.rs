@@ -2393,12 +2393,10 @@ fn small_things_are_seen_far_from_the_origin() {
         let plant = Lifted(far + 1.2345);
         let ceiling = StateBound::at_most(1, far + 0.003).expect("valid bound");
         let goal = StateBound::at_least(0, far + 2.5).expect("valid bound");
-        let filter = Filter::builder(plant)
-            .source(
-                "ceiling",
-                along(Arc::new(plant), ceiling, 1).expect("a degree"),
-                BarrierSettings::keeping(),
-            )
+        let builder = Filter::builder(plant);
+        let on = builder.plant();
+        let filter = builder
+            .source("ceiling", along(on, ceiling, 1).expect("a degree"), BarrierSettings::keeping())
             .and_then(|b| b.barrier("goal", goal, BarrierSettings::within(4.0)))
             .and_then(|b| b.bounds(&[-1.0, -0.01], &[1.0, 0.01]))
             .and_then(|b| b.sampling(Sampling::Period(PERIOD)))

@@ -170,8 +170,8 @@ impl Case {
     pub(crate) fn filter(&self) -> Filter {
         let inputs = self.plant.inputs();
         let mut builder = Filter::from_sources(self.plant.states(), inputs);
-        for set in &self.sets {
-            let source = self.plant.source(&set.shape);
+        let shapes: Vec<_> = self.sets.iter().map(|set| &set.shape).collect();
+        for (set, source) in self.sets.iter().zip(self.plant.sources(&shapes)) {
             builder = builder.source("set", source, set.settings()).expect("valid settings");
         }
         let low = self.bounds.map(|bound| -bound);

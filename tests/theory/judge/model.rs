@@ -139,28 +139,32 @@ impl Plant {
         }
     }
 
-    /// The derivatives of a set's h along the plant, as the filter takes them.
-    pub(crate) fn source(&self, shape: &Shape) -> Box<dyn DerivativeSource> {
+    /// The derivatives of each set's h along the plant, as the filter takes them.
+    pub(crate) fn sources(&self, shapes: &[&Shape]) -> Vec<Box<dyn DerivativeSource>> {
         match *self {
-            Self::PointMass => disc(PointMass, shape),
-            Self::Unicycle => disc(Unicycle, shape),
-            Self::Bicycle { l_r } => disc(Bicycle::new(l_r).expect("valid bicycle"), shape),
+            Self::PointMass => each(PointMass, shapes, disc),
+            Self::Unicycle => each(Unicycle, shapes, disc),
+            Self::Bicycle { l_r } => each(Bicycle::new(l_r).expect("valid bicycle"), shapes, disc),
             Self::SmallSlip { l_r } => {
-                steered(SmallSlipBicycle::new(l_r).expect("valid bicycle").with_rate(), shape)
+                each(SmallSlipBicycle::new(l_r).expect("valid bicycle").with_rate(), shapes, steered)
             }
             Self::Kinematic { length } => {
-                steered(KinematicBicycle::new(length, length).expect("valid bicycle"), shape)
+                each(KinematicBicycle::new(length, length).expect("valid bicycle"), shapes, steered)
             }
-            Self::Chain(n) => {
-                let &Shape::Line { sign, at } = shape else { panic!("no set of a chain: {shape:?}") };
-                chain(n, Line { sign, at })
-            }
-            _ => self.written(shape),
+            Self::Chain(1) => each(Chain::<1>, shapes, line),
+            Self::Chain(2) => each(Chain::<2>, shapes, line),
+            Self::Chain(3) => each(Chain::<3>, shapes, line),
+            Self::Chain(4) => each(Chain::<4>, shapes, line),
+            Self::Chain(5) => each(Chain::<5>, shapes, line),
+            Self::Chain(6) => each(Chain::<6>, shapes, line),
+            Self::Chain(7) => each(Chain::<7>, shapes, line),
+            Self::Chain(_) => each(Chain::<8>, shapes, line),
+            _ => each((), shapes, |plant, shape| self.written(plant, shape)),
         }
     }
 
-    /// The same from expressions.
-    fn written(&self, shape: &Shape) -> Box<dyn DerivativeSource> {
+    /// The same from expressions, along `plant`.
+    fn written(&self, plant: Arc<()>, shape: &Shape) -> Box<dyn DerivativeSource> {
         let (states, derivatives, mut parameters): (_, Vec<&str>, Vec<(&str, f64)>) = match *self {
             Self::Cart { drag: [a, b] } => {
                 (["y", "z"], vec!["z", "u - a*z - b*z*sqrt(z^2 + 1)"], vec![("a", a), ("b", b)])
@@ -184,6 +188,7 @@ impl Plant {
         };
         parameters.extend(more);
         let model = Model::new(&states[..derivatives.len()], &["u"], &parameters, &derivatives);
+        let model = model.map(|model| model.as_form_of(plant));
         let barrier = model.and_then(|model| model.barrier(text)).expect("valid expressions");
         barrier.source(n).expect("a relative degree")
     }
@@ -229,18 +234,19 @@ impl<const N: usize> Barrier<N> for Line {
     }
 }
 
-fn chain(n: usize, line: Line) -> Box<dyn DerivativeSource> {
-    let source = match n {
-        1 => lie::along(Arc::new(Chain::<1>), line, 1),
-        2 => lie::along(Arc::new(Chain::<2>), line, 2),
-        3 => lie::along(Arc::new(Chain::<3>), line, 3),
-        4 => lie::along(Arc::new(Chain::<4>), line, 4),
-        5 => lie::along(Arc::new(Chain::<5>), line, 5),
-        6 => lie::along(Arc::new(Chain::<6>), line, 6),
-        7 => lie::along(Arc::new(Chain::<7>), line, 7),
-        _ => lie::along(Arc::new(Chain::<8>), line, 8),
-    };
-    source.expect("a relative degree")
+/// The sources of all sets along one plant.
+fn each<P>(
+    plant: P,
+    shapes: &[&Shape],
+    source: impl Fn(Arc<P>, &Shape) -> Box<dyn DerivativeSource>,
+) -> Vec<Box<dyn DerivativeSource>> {
+    let plant = Arc::new(plant);
+    shapes.iter().map(|shape| source(Arc::clone(&plant), shape)).collect()
+}
+
+fn line<const N: usize>(plant: Arc<Chain<N>>, shape: &Shape) -> Box<dyn DerivativeSource> {
+    let &Shape::Line { sign, at } = shape else { panic!("no set of a chain: {shape:?}") };
+    lie::along(plant, Line { sign, at }, N).expect("a relative degree")
 }
 
 /// limit − sign x₅, for the filter.
@@ -256,15 +262,15 @@ impl Barrier<5> for Angle {
     }
 }
 
-fn steered<P>(plant: P, shape: &Shape) -> Box<dyn DerivativeSource>
+fn steered<P>(plant: Arc<P>, shape: &Shape) -> Box<dyn DerivativeSource>
 where
     P: ControlAffine<5, 2> + Send + Sync + 'static,
 {
     let &Shape::Angle { sign, limit } = shape else { return disc(plant, shape) };
-    lie::along(Arc::new(plant), Angle { sign, limit }, 1).expect("a relative degree")
+    lie::along(plant, Angle { sign, limit }, 1).expect("a relative degree")
 }
 
-fn disc<P, const N: usize>(plant: P, shape: &Shape) -> Box<dyn DerivativeSource>
+fn disc<P, const N: usize>(plant: Arc<P>, shape: &Shape) -> Box<dyn DerivativeSource>
 where
     P: ControlAffine<N, 2> + Send + Sync + 'static,
 {
@@ -274,18 +280,10 @@ where
     let source = if let Some(smoothing) = smoothing {
         let disc = DistanceDisc::new(start, radius, smoothing).and_then(|d| d.moving(velocity));
         let disc = disc.expect("valid disc");
-        if outside {
-            lie::along(Arc::new(plant), Outside(disc), 2)
-        } else {
-            lie::along(Arc::new(plant), disc, 2)
-        }
+        if outside { lie::along(plant, Outside(disc), 2) } else { lie::along(plant, disc, 2) }
     } else {
         let disc = QuadraticDisc::new(start, radius).and_then(|d| d.moving(velocity)).expect("valid disc");
-        if outside {
-            lie::along(Arc::new(plant), Outside(disc), 2)
-        } else {
-            lie::along(Arc::new(plant), disc, 2)
-        }
+        if outside { lie::along(plant, Outside(disc), 2) } else { lie::along(plant, disc, 2) }
     };
     source.expect("a relative degree")
 }
