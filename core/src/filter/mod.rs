@@ -191,14 +191,14 @@ impl Filter {
         if let Some(backup) = &mut self.backup {
             backup.sample((rows, integrator.as_ref()), t, hold, x, u_ref, u);
         }
-        // The mean of the integral replaces the rate.
+        // The mean of the integral replaces the rate, which a plan has to remember.
         #[cfg(feature = "plan")]
-        let inside = core::array::from_fn(|i| u.get(i).copied().unwrap_or(0.0));
+        let inside = self.backup.as_ref().map(|_| core::array::from_fn(|i| u.get(i).copied().unwrap_or(0.0)));
         if let Some(own) = integrator {
             rows.workspace.next.integrated = own.finish(rows.state.integrated, hold, u);
         }
         #[cfg(feature = "plan")]
-        if let Some(backup) = &mut self.backup {
+        if let (Some(backup), Some(inside)) = (&mut self.backup, inside) {
             backup.remember((t, hold), x, u_ref, u, inside);
         }
         Ok(())
@@ -386,14 +386,13 @@ impl Filter {
         if let Some(backup) = &self.backup {
             backup.check(&self.rows, state)?;
         }
-        self.rows.state.clone_from(state);
+        self.rows.state.clone_rows_from(state);
         let integrated = self.integrator.as_ref().map_or(0.0, |own| own.limited(state.integrated));
         self.rows.state.integrated = integrated;
         #[cfg(feature = "plan")]
-        match &mut self.backup {
-            Some(backup) => backup.restart(&self.rows.state.plan),
-            // Rows alone follow no plan.
-            None => self.rows.state.plan = PlanState::default(),
+        if let Some(backup) = &mut self.backup {
+            self.rows.state.plan.clone_from(&state.plan);
+            backup.restart(&self.rows.state.plan);
         }
         Ok(())
     }
