@@ -1,4 +1,4 @@
-//! A sheet to draw on, in pixels from the top left corner, written as SVG. Only this file names the crate svg.
+//! A sheet to draw on, in pixels from the top left corner, written as SVG. Only this file uses the crate svg.
 
 use std::path::Path;
 
@@ -9,11 +9,12 @@ use svg::node::element::{
 };
 use svg::{Document, Node};
 
-/// Families in order of preference; the viewer has one of them.
+/// Font families in order of preference; the viewer uses the first that it has.
 const FONT: &str = "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif";
-/// Mean width of a character over the size of the font: a digit of Helvetica has 0.556, English words have less.
+/// Mean width of a character relative to the font size: a digit of Helvetica has 0.556, English words less.
 const CHARACTER: f64 = 0.556;
-/// From the middle of a line of text down to its base line, over the size of the font: half a capital of Helvetica.
+/// Distance from the middle of a line of text down to its base line, relative to the font size: half a
+/// capital of Helvetica.
 const MIDDLE: &str = "0.36em";
 /// The same from the top of a line.
 const TOP: &str = "0.76em";
@@ -46,7 +47,7 @@ pub(super) enum Anchor {
     Middle,
 }
 
-/// The pen of a line.
+/// How a line is drawn.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pen {
     pub(super) colour: [u8; 3],
@@ -62,7 +63,7 @@ impl Pen {
     }
 }
 
-/// The width of a text in pixels, about: the viewer chooses the font, so nobody here knows it.
+/// The approximate width of a text in pixels; the viewer chooses the font, so the exact width is unknown.
 pub(super) fn text_width(text: &str, size: f64) -> f64 {
     text.chars().count() as f64 * size * CHARACTER
 }
@@ -76,7 +77,7 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
-    /// A white sheet of this size in pixels. `name` begins its ids, which must differ among the sheets of a page.
+    /// A white sheet of this size in pixels. `name` is the prefix of its ids, which must be unique on a page.
     pub(super) fn new(name: &str, width: f64, height: f64) -> Self {
         let mut canvas =
             Self { name: name.to_owned(), size: (width, height), content: Group::new(), clips: Vec::new() };
@@ -108,7 +109,7 @@ impl Canvas {
         self.add(line);
     }
 
-    /// Dots or crosses of the size that `pen` gives them, as one element, since there may be thousands.
+    /// Dots or crosses sized by `pen`, as one element, since there may be thousands.
     pub(super) fn scattered(&mut self, points: impl Iterator<Item = Point>, crosses: bool, pen: Pen) {
         let mark = |(x, y): Point| match crosses {
             true => format!("M{} {}l6 6m0 -6l-6 6", fine(x - 3.0), fine(y - 3.0)),
@@ -127,14 +128,14 @@ impl Canvas {
         self.add(filled(Polygon::new().set("points", coordinates(points)), colour, opacity));
     }
 
-    /// A circle of this radius in pixels: filled, then drawn around.
+    /// A circle with this radius in pixels, filled and then outlined.
     pub(super) fn circle(&mut self, centre: Point, radius: f64, fill: ([u8; 3], f64), pen: Pen) {
         let circle = Circle::new().set("cx", fine(centre.0)).set("cy", fine(centre.1)).set("r", fine(radius));
         let circle = circle.set("stroke", hex(pen.colour)).set("stroke-width", pen.width);
         self.add(filled(circle, fill.0, fill.1));
     }
 
-    /// The area within an odd number of closed lines: filled, then drawn around.
+    /// The area that an odd number of closed lines encloses, filled and then outlined.
     pub(super) fn area(
         &mut self,
         rings: impl Iterator<Item = impl Iterator<Item = Point>>,
@@ -158,13 +159,13 @@ impl Canvas {
         self.add(written(text, at, size, anchor, colour));
     }
 
-    /// A text that runs upwards, its middle at `at`.
+    /// A text that runs upwards, centred at `at`.
     pub(super) fn upward_text(&mut self, text: &str, at: Point, size: f64, colour: [u8; 3]) {
         let turn = format!("rotate(-90 {} {})", fine(at.0), fine(at.1));
         self.add(written(text, at, size, Anchor::Middle, colour).set("transform", turn));
     }
 
-    /// Draws with everything outside a rectangle (left, top, right, bottom) cut away.
+    /// Draws with everything outside a rectangle (left, top, right, bottom) clipped.
     pub(super) fn clipped(&mut self, area: [f64; 4], draw: impl FnOnce(&mut Self)) {
         let known = self.clips.iter().position(|other| *other == area);
         let index = known.unwrap_or(self.clips.len());
@@ -238,7 +239,7 @@ fn coordinates(points: &[Point]) -> Vec<(f64, f64)> {
     points.iter().map(|point| (fine(point.0), fine(point.1))).collect()
 }
 
-/// A length in pixels to two digits after the point. Adding 0 takes the sign from a zero.
+/// A length in pixels, rounded to two decimals. Adding 0 removes the sign of a zero.
 fn fine(length: f64) -> f64 {
     (length * 100.0).round() / 100.0 + 0.0
 }
