@@ -1,22 +1,23 @@
-//! Disturbances of a plant: numbers that look random, each a function of seed, signal and time alone. Nothing is
-//! remembered between steps, so a state that is restored goes on bit for bit.
+//! Disturbances of a plant: pseudorandom numbers that depend only on seed, signal and time. Nothing is
+//! remembered between steps, so a restored state continues bit for bit.
 
 use crate::configuration::PlantConfiguration;
 
-/// Part of a period by which the time may fall short of its start: round-off in the importer's time.
+/// Fraction of a period by which the time may fall short of its start, to allow for round-off in the
+/// importer's time.
 const ROUND_OFF: f64 = 1e-6;
 
 /// Noise on the inputs and measurements of a plant.
 #[derive(Default)]
 pub(super) struct Disturbance {
     period: f64,
-    /// By input; empty without a disturbance.
+    /// By input; empty if there is no disturbance.
     inputs: Vec<f64>,
-    /// By state; empty without a disturbance.
+    /// By state; empty if there is no disturbance.
     measurements: Vec<f64>,
 }
 
-/// The two kinds of signals: their sequences differ.
+/// The two kinds of signals, which have different sequences.
 #[derive(Clone, Copy)]
 enum Kind {
     Input = 1,
@@ -43,7 +44,7 @@ impl Disturbance {
         !self.inputs.is_empty()
     }
 
-    /// Adds to the inputs `u` the disturbance in force at time `t` (s) under `seed`.
+    /// Adds to the inputs `u` the disturbance at time `t` (s) under `seed`.
     pub(super) fn push(&self, seed: f64, t: f64, u: &mut [f64]) {
         self.add(Kind::Input, &self.inputs, seed, t, u);
     }
@@ -53,7 +54,7 @@ impl Disturbance {
         !self.measurements.is_empty()
     }
 
-    /// Adds to the measurements `x` the disturbance in force at time `t` (s) under `seed`.
+    /// Adds to the measurements `x` the disturbance at time `t` (s) under `seed`.
     pub(super) fn blur(&self, seed: f64, t: f64, x: &mut [f64]) {
         self.add(Kind::Measurement, &self.measurements, seed, t, x);
     }
@@ -68,7 +69,7 @@ impl Disturbance {
     }
 }
 
-/// A number in [−1, 1) that depends on `key` alone.
+/// A number in [−1, 1) that depends only on `key`.
 fn uniform(key: [u64; 4]) -> f64 {
     let bits = key.into_iter().fold(0, |state, word| mixed(state ^ word));
     // 53 bits, as many as a double has.
@@ -104,12 +105,12 @@ mod tests {
         assert!(all.iter().all(|w| w.abs() <= 2.0));
         let mean = all.iter().sum::<f64>() / 1e4;
         let square = all.iter().map(|w| w * w).sum::<f64>() / 1e4;
-        // A uniform number up to 2 has the mean 0 and the mean square 4/3. The mean of 10,000 of them has a
+        // A uniform number up to 2 has mean 0 and mean square 4/3. The mean of 10,000 of them has a standard
         // deviation of 0.012. The tolerance is five of these.
         assert!(mean.abs() < 0.06 && (square - 4.0 / 3.0).abs() < 0.06, "{mean}, {square}");
         let follow = all.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / 1e4;
         assert!(follow.abs() < 0.07, "one tells of the next: {follow}");
-        // An input without a bound keeps its value, and a disturbance lasts for its period.
+        // An input without a disturbance bound keeps its value, and a disturbance lasts for its period.
         assert_eq!((at(0.35)[1], at(0.35)), (1.0, at(0.3)));
         assert_ne!(at(0.3), at(0.4));
         assert_eq!(at(-0.05), at(-0.1));
