@@ -1,9 +1,10 @@
-//! The tutorial and the page on obstacles: their steps are done, and what they show is what happens.
+//! The tutorial and the page on obstacles: their steps are carried out, and their output is what the pages
+//! show.
 
 use crate::models::{blocks, document};
 use crate::workshop::Workshop;
 
-/// Asserts that each line of `shown` is a line of `told`, but for blanks at its end.
+/// Asserts that each line of `shown` is a line of `told`, except for trailing blanks.
 #[track_caller]
 fn assert_told(shown: &str, told: &str) {
     for line in shown.lines() {
@@ -69,7 +70,7 @@ fn the_tutorial_is_what_happens() {
     assert!(workshop.files().contains(&"plant.fmu".to_owned()));
 }
 
-/// Each file, and the lines of its run that follow it.
+/// Each file, followed by the lines that its run prints.
 #[test]
 fn the_page_on_obstacles_is_what_happens() {
     let (workshop, text) = (Workshop::new(), document("obstacles.md"));
@@ -83,7 +84,7 @@ fn the_page_on_obstacles_is_what_happens() {
         assert_eq!(told.code, i32::from(shown.contains("not kept")), "{told:#?}");
         assert_told(shown, &told.stdout);
     }
-    // What is said of the two files beside: alone rows get stuck, and with a hint there is a way.
+    // The two variants on the page: on their own, rows get stuck; with a hint there is a way.
     let all = blocks(&text, "toml");
     let [.., rows, hinted, _, _] = all[..] else { panic!("{all:?}") };
     workshop.write("my.toml", rows.replace("assurance = \"off\"", "assurance = \"on\""));
