@@ -1,8 +1,8 @@
-//! Filters with a backup plan, by the figures that they are measured by: how many starts they accept of those that are
-//! possible, whether all that is accepted is kept, and what a step takes.
+//! Filters with a backup plan, and the figures that measure them: which fraction of the possible starts they
+//! accept, whether everything accepted is kept, and the cost of a step.
 //!
-//! Each table has a quick size for every run of the tests and a full one for `tests/nightly`. `PUNCTUAL_ASSURED`
-//! says another number of cases for any of them.
+//! Each table has a quick size for every run of the tests and a full one for `tests/nightly`.
+//! `PUNCTUAL_ASSURED` sets another number of cases for all of them.
 
 #![allow(clippy::print_stdout, reason = "the figures are read from the output")]
 
