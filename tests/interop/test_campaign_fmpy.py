@@ -78,7 +78,7 @@ def test_every_column_has_its_unit_and_meaning_as_metadata(campaign):
 
 
 def bits(value):
-    """What tells every bit of a cell."""
+    """A representation that shows every bit of a cell."""
     return struct.pack("<d", value) if isinstance(value, float) else value
 
 

@@ -42,7 +42,7 @@ def test_licences_are_those_of_what_is_linked():
     listed = told.partition("=" * 80)[0].splitlines()
     crates = {line.split()[0] for line in listed if ": " in line}
     assert {"clarabel", "nalgebra", "parquet", "toml", "zip"} <= crates
-    # Tests, benches and build scripts are not inside; nor are we.
+    # Tests, benches, build scripts and our own crates are not included.
     assert not crates & {"criterion", "proptest", "cc", "punctual-core"}
     for words in ["Permission is hereby granted, free of charge", "Apache License", "Mozilla Public License"]:
         assert words in told
