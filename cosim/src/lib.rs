@@ -7,7 +7,7 @@
 //! exit                 the exit codes of processes that use it
 //! status               the status of an FMI call, and log messages
 //! error                the errors of everything here, with names and numbers
-//! text                 files of text, and what is said of others in their place
+//! text                 text files, and other files given in their place
 //! host                 one FMU: archive, description, library, instance
 //! whole                files that are written whole or not at all
 //! isolation            FMUs in a child process, which may crash

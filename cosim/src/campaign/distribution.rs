@@ -193,7 +193,7 @@ impl VarySection {
     }
 }
 
-/// The distribution in words, without its unit.
+/// The distribution as text, without its unit.
 impl fmt::Display for Distribution {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -21,7 +21,7 @@ use crate::host::{Causality, DataType, Variability};
 use crate::package;
 use crate::text;
 
-/// A campaign file as it is written.
+/// The content of a campaign file.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
@@ -98,7 +98,7 @@ pub enum Success {
 pub struct Source {
     /// The campaign file.
     pub file: String,
-    /// The system file, where the campaign file names one.
+    /// The system file, if the campaign file names one.
     pub system: Option<String>,
     /// The configuration of each component in order, with every value stated. For an FMU of another program,
     /// the text that identifies its file.

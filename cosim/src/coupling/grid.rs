@@ -45,7 +45,7 @@ impl Grid {
         if k + 1 < self.steps { self.step } else { self.last }
     }
 
-    /// The last step, in seconds, where it is shorter than the others.
+    /// The last step, in seconds, if it is shorter than the others.
     pub fn shortened(&self) -> Option<f64> {
         (self.last != self.step).then_some(self.last)
     }

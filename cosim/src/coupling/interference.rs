@@ -142,7 +142,7 @@ pub(super) fn ports(system: &System, descriptions: &[&Description], links: &[Lin
 }
 
 impl Watched {
-    /// `None` where a port has no slot.
+    /// `None` if a port has no slot.
     pub(super) fn new(layout: &Layout, ports: &Ports) -> Option<Self> {
         let pair = |pair: &Pair<Port>| {
             let Pair { wanted, given, width } = *pair;

@@ -38,7 +38,7 @@ pub enum Kept {
 }
 
 impl Kept {
-    /// The verdict in words.
+    /// The verdict as text.
     pub fn words(self) -> &'static str {
         match self {
             Self::Kept => "kept",
@@ -321,7 +321,7 @@ fn is_of(name: &str, all: &str) -> bool {
 }
 
 /// The Real inputs of `component` that have neither a connection nor a start value in the system file.
-fn loose<'a>(
+fn unfed<'a>(
     system: &System,
     component: usize,
     description: &'a Description,
@@ -338,8 +338,8 @@ fn loose<'a>(
     let all = description.variables.iter().enumerate();
     let all = all.filter(|(_, v)| v.causality == Causality::Input && v.family() == Family::Real);
     let ports = all.map(|(variable, v)| (Port { component, variable }, v.name.as_str()));
-    let loose = |port: &Port| links.iter().all(|link| link.to != *port);
-    ports.filter(|(port, name)| loose(port) && !given(port.variable, name)).collect()
+    let unfed = |port: &Port| links.iter().all(|link| link.to != *port);
+    ports.filter(|(port, name)| unfed(port) && !given(port.variable, name)).collect()
 }
 
 /// Refuses Real inputs that nothing feeds, which would silently stay at the FMU's start value. The wanted
@@ -357,12 +357,12 @@ pub fn check_fed(
     /// The most names in a message.
     const NAMES: usize = 8;
     for (component, description) in descriptions.iter().enumerate() {
-        let mut loose = loose(system, component, description, links);
+        let mut unfed = unfed(system, component, description, links);
         let filter = is_filter(description);
-        loose.retain(|(port, name)| !(given.contains(port) || filter && is_of(name, WANTED)));
-        let Some((_, first)) = loose.first() else { continue };
-        let names: Vec<_> = loose.iter().take(NAMES).map(|(_, name)| *name).collect();
-        let more = match loose.len() - names.len() {
+        unfed.retain(|(port, name)| !(given.contains(port) || filter && is_of(name, WANTED)));
+        let Some((_, first)) = unfed.first() else { continue };
+        let names: Vec<_> = unfed.iter().take(NAMES).map(|(_, name)| *name).collect();
+        let more = match unfed.len() - names.len() {
             0 => String::new(),
             more => format!(" and {more} more"),
         };
@@ -385,14 +385,14 @@ pub(super) fn unwanted(system: &System, descriptions: &[&Description], links: &[
         let wanted = |name: &str| is_of(name, WANTED);
         let inputs = description.variables.iter().filter(|v| v.causality == Causality::Input);
         let count = inputs.filter(|v| wanted(&v.name)).count();
-        let loose = loose(system, component, description, links);
-        let loose: Vec<_> = loose.into_iter().map(|(_, name)| name).filter(|name| wanted(name)).collect();
-        if !loose.is_empty() && loose.len() == count {
+        let unfed = unfed(system, component, description, links);
+        let unfed: Vec<_> = unfed.into_iter().map(|(_, name)| name).filter(|name| wanted(name)).collect();
+        if !unfed.is_empty() && unfed.len() == count {
             notes.push(format!(
                 "{}: nothing feeds {}: the wanted input is 0 at all times, and nothing damps the motion along the set; \
                  connect a controller, such as damping, or give a start value",
                 system.components()[component].name,
-                loose.join(", ")
+                unfed.join(", ")
             ));
         }
     }
@@ -400,7 +400,7 @@ pub(super) fn unwanted(system: &System, descriptions: &[&Description], links: &[
 }
 
 impl Watched {
-    /// `None` where a port has no slot.
+    /// `None` if a port has no slot.
     pub(super) fn new(layout: &Layout, ports: &Ports) -> Option<Self> {
         let mut slots = [0; FIELDS.len()];
         for (slot, port) in slots.iter_mut().zip(&ports.fields) {

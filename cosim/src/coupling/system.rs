@@ -390,7 +390,7 @@ pub struct TimePicture {
     pub signals: Vec<String>,
     /// Signals drawn as dashed lines.
     pub dashed: Vec<String>,
-    /// The label of the y axis; default the unit, where all signals share one.
+    /// The label of the y axis; default the unit, if all signals share one.
     pub ylabel: Option<String>,
     /// A vertical line at this time in seconds, finite.
     pub deadline: Option<f64>,

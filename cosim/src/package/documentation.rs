@@ -15,7 +15,7 @@ pub(super) struct Described {
     pub(super) rows: Vec<Row>,
 }
 
-/// The range of a number, in words.
+/// The range of a number, as text.
 fn range(min: Option<f64>, max: Option<f64>) -> String {
     let text = |value: Option<f64>| value.map(shown).unwrap_or_default();
     match (min, max) {
