@@ -37,7 +37,7 @@ unsafe impl Send for Logger {}
 
 /// The kind of a message, which determines its status and category.
 #[derive(Clone, Copy)]
-enum Matter {
+enum MessageKind {
     Error,
     Warning,
     Event,
@@ -68,27 +68,27 @@ impl Logger {
 
     /// Logs a failed call.
     pub(super) fn error(&self, message: &str) {
-        self.send(Matter::Error, message);
+        self.send(MessageKind::Error, message);
     }
 
     /// Logs a notice to the user.
     pub(super) fn warning(&self, message: &str) {
         if self.warnings {
-            self.send(Matter::Warning, message);
+            self.send(MessageKind::Warning, message);
         }
     }
 
     /// Logs why a call was not done although the run may continue.
     pub(super) fn discarded(&self, message: &str) {
         if self.warnings {
-            self.send(Matter::Discarded, message);
+            self.send(MessageKind::Discarded, message);
         }
     }
 
     /// Logs an event, if events are enabled.
     pub(super) fn event(&self, message: &str) {
         if self.events {
-            self.send(Matter::Event, message);
+            self.send(MessageKind::Event, message);
         }
     }
 
@@ -110,19 +110,19 @@ impl Logger {
         Ok(())
     }
 
-    fn send(&self, matter: Matter, message: &str) {
-        let category = match matter {
-            Matter::Error => ERRORS,
-            Matter::Warning | Matter::Discarded => WARNINGS,
-            Matter::Event => EVENTS,
+    fn send(&self, kind: MessageKind, message: &str) {
+        let category = match kind {
+            MessageKind::Error => ERRORS,
+            MessageKind::Warning | MessageKind::Discarded => WARNINGS,
+            MessageKind::Event => EVENTS,
         }
         .as_ptr();
         // Statuses have the same numbers in both versions.
-        let status = match matter {
-            Matter::Error => fmi3::Status::ERROR,
-            Matter::Warning => fmi3::Status::WARNING,
-            Matter::Discarded => fmi3::Status::DISCARD,
-            Matter::Event => fmi3::Status::OK,
+        let status = match kind {
+            MessageKind::Error => fmi3::Status::ERROR,
+            MessageKind::Warning => fmi3::Status::WARNING,
+            MessageKind::Discarded => fmi3::Status::DISCARD,
+            MessageKind::Event => fmi3::Status::OK,
         };
         match &self.function {
             None => {}

@@ -119,8 +119,8 @@ fn open_at(path: &Path) -> Result<Library, libloading::Error> {
 #[cfg(windows)]
 fn open_at(path: &Path) -> Result<Library, libloading::Error> {
     use libloading::os::windows::{LOAD_WITH_ALTERED_SEARCH_PATH, Library};
-    // Libraries that it depends on lie beside it. SAFETY: running the plug-in's initialisers is what the user
-    // asked for by naming it.
+    // Libraries that it depends on lie beside it.
+    // SAFETY: running the plug-in's initialisers is what the user asked for by naming it.
     let library = unsafe { Library::load_with_flags(loadable(path), LOAD_WITH_ALTERED_SEARCH_PATH) }?;
     Ok(library.into())
 }

@@ -40,22 +40,22 @@ impl Disturbance {
     }
 
     /// Whether it changes the inputs.
-    pub(super) fn is_of_inputs(&self) -> bool {
+    pub(super) fn affects_inputs(&self) -> bool {
         !self.inputs.is_empty()
     }
 
     /// Adds to the inputs `u` the disturbance at time `t` (s) under `seed`.
-    pub(super) fn push(&self, seed: f64, t: f64, u: &mut [f64]) {
+    pub(super) fn disturb(&self, seed: f64, t: f64, u: &mut [f64]) {
         self.add(Kind::Input, &self.inputs, seed, t, u);
     }
 
     /// Whether it changes the measurements.
-    pub(super) fn is_of_measurements(&self) -> bool {
+    pub(super) fn affects_measurements(&self) -> bool {
         !self.measurements.is_empty()
     }
 
     /// Adds to the measurements `x` the disturbance at time `t` (s) under `seed`.
-    pub(super) fn blur(&self, seed: f64, t: f64, x: &mut [f64]) {
+    pub(super) fn add_noise(&self, seed: f64, t: f64, x: &mut [f64]) {
         self.add(Kind::Measurement, &self.measurements, seed, t, x);
     }
 
@@ -98,7 +98,7 @@ mod tests {
         let disturbance = example();
         let at = |t: f64| {
             let mut u = [1.0, 1.0];
-            disturbance.push(3.0, t, &mut u);
+            disturbance.disturb(3.0, t, &mut u);
             u
         };
         let all: Vec<f64> = (0..10_000).map(|k| at(0.1 * f64::from(k))[0] - 1.0).collect();
@@ -118,13 +118,13 @@ mod tests {
 
     #[test]
     fn seeds_and_kinds_have_their_own_sequences() {
-        let drawn = |seed: f64, blur: bool| {
+        let drawn = |seed: f64, noisy: bool| {
             let mut x = [0.0];
             let disturbance = example();
-            if blur {
-                disturbance.blur(seed, 1.0, &mut x);
+            if noisy {
+                disturbance.add_noise(seed, 1.0, &mut x);
             } else {
-                disturbance.push(seed, 1.0, &mut x);
+                disturbance.disturb(seed, 1.0, &mut x);
             }
             x[0]
         };

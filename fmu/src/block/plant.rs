@@ -127,8 +127,8 @@ impl Block for PlantBlock {
         let reported = &mut values.reals[self.layout.outputs..self.layout.parameters];
         let (measured, others) = reported.split_at_mut(self.layout.states);
         measured.copy_from_slice(&self.x);
-        if self.disturbance.is_of_measurements() {
-            self.disturbance.blur(seed, t, measured);
+        if self.disturbance.affects_measurements() {
+            self.disturbance.add_noise(seed, t, measured);
         }
         if let Some(outputs) = &mut self.outputs {
             others.iter_mut().zip(outputs.at(t, |i| self.x[i])).for_each(|(to, value)| *to = value);
@@ -158,9 +158,9 @@ impl Block for PlantBlock {
         self.next.copy_from_slice(&self.x);
         let (inner, mut k) = (h / substeps, 0.0);
         while k < substeps {
-            let held = if self.disturbance.is_of_inputs() {
+            let held = if self.disturbance.affects_inputs() {
                 self.u.copy_from_slice(u);
-                self.disturbance.push(self.seed(values), t + k * inner, &mut self.u);
+                self.disturbance.disturb(self.seed(values), t + k * inner, &mut self.u);
                 &self.u
             } else {
                 u
