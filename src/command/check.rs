@@ -389,10 +389,10 @@ fn filter(
         warnings.push("the experiment stops before the filter is armed".to_owned());
     }
     if closed_loop.is_some() {
-        warnings.extend(of_the_run(c));
+        warnings.extend(differences_from_run(c));
     }
     if !c.is_assured() {
-        warnings.extend(in_vain(c));
+        warnings.extend(disjoint_pairs(c));
     }
     let degrees: Vec<usize> = filter.relative_degrees().collect();
     let (mixed_degree, inputs) = (c.mixed_degree(), c.plant.inputs());
@@ -441,7 +441,7 @@ fn filter(
             warn("the experiment stops before the deadline".to_owned());
         }
         let mixed_degree = mixed_degree.iter().find(|(barrier, _)| *barrier == i).map(|(_, found)| found);
-        of_the_method(c, &rows, i, mixed_degree.is_some()).into_iter().for_each(&mut warn);
+        method_warnings(c, &rows, i, mixed_degree.is_some()).into_iter().for_each(&mut warn);
         // Findings from the start.
         let report = begun.then(|| filter.report().barriers[i]);
         let reach = match (simulated, settings.deadline) {
@@ -529,7 +529,7 @@ fn first_rows(c: &FilterConfiguration, start: Option<&[f64]>) -> Result<Filter, 
 
 /// Warnings on the method of barrier `i` from the first sample of `rows`. `mixed_degree` says that its inputs
 /// enter at different orders.
-fn of_the_method(c: &FilterConfiguration, rows: &Filter, i: usize, mixed_degree: bool) -> Vec<String> {
+fn method_warnings(c: &FilterConfiguration, rows: &Filter, i: usize, mixed_degree: bool) -> Vec<String> {
     let mut warnings = Vec::new();
     if mixed_degree && !c.is_assured() {
         let reason = c.unassured();
@@ -555,7 +555,7 @@ fn of_the_method(c: &FilterConfiguration, rows: &Filter, i: usize, mixed_degree:
 }
 
 /// How the closed loops of `check` differ from the run that the file describes.
-fn of_the_run(c: &FilterConfiguration) -> Vec<String> {
+fn differences_from_run(c: &FilterConfiguration) -> Vec<String> {
     let simulated = c.run.simulated.as_ref().map(|_| match closed_loop::simulated(c) {
         Some(_) => "the closed loop has the plant in `simulated`; plans and deadlines are those of the filter's own model",
         None => {
@@ -569,7 +569,7 @@ fn of_the_run(c: &FilterConfiguration) -> Vec<String> {
 }
 
 /// Pairs of barriers that both must hold forever although their sets do not intersect.
-fn in_vain(c: &FilterConfiguration) -> Vec<String> {
+fn disjoint_pairs(c: &FilterConfiguration) -> Vec<String> {
     let is_kept = |i: &usize| {
         let b = &c.barrier[*i];
         b.penalty.is_none() && b.end.is_none() && !b.until_arrival
@@ -583,19 +583,20 @@ fn in_vain(c: &FilterConfiguration) -> Vec<String> {
 
 /// What the user should know of the filter before a run of the file, prefixed with the barrier's name. If the
 /// promise was `refused`, this includes the deadlines with which there is a plan.
-pub(super) fn known(c: &FilterConfiguration, refused: bool) -> Result<Vec<String>, Error> {
+pub(super) fn notes_before_run(c: &FilterConfiguration, refused: bool) -> Result<Vec<String>, Error> {
     let mut x0 = vec![0.0; c.plant.states().len()];
     let (plant, _) = c.alone()?;
     x0.iter_mut().zip(c.plant.states()).for_each(|(x, s)| *x = plant.x0.get(&s.name).copied().unwrap_or(0.0));
     x0.extend(c.barrier_inputs().iter().map(|input| input.start));
     let c = &c.clone().armed_at_once();
-    let (mixed_degree, mut known) = (c.mixed_degree(), if c.is_assured() { Vec::new() } else { in_vain(c) });
+    let (mixed_degree, mut known) =
+        (c.mixed_degree(), if c.is_assured() { Vec::new() } else { disjoint_pairs(c) });
     if c.external().is_none() {
         let rows = first_rows(c, Some(&x0))?;
         for (i, section) in c.barrier.iter().enumerate() {
             let is_mixed = mixed_degree.iter().any(|(barrier, _)| *barrier == i);
             known.extend(
-                of_the_method(c, &rows, i, is_mixed)
+                method_warnings(c, &rows, i, is_mixed)
                     .into_iter()
                     .map(|text| format!("{}: {text}", section.name)),
             );

@@ -266,7 +266,7 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
     notes.extend(remarks(&outcome.promises));
     if let Some(filter) = filter {
         let is_refused = is_refused(&outcome.recording);
-        notes.extend(check::known(&filter, is_refused).map_err(|e| e.in_file(path))?);
+        notes.extend(check::notes_before_run(&filter, is_refused).map_err(|e| e.in_file(path))?);
     }
     let notes = output::grouped(notes);
     let mut files = Vec::new();
