@@ -112,8 +112,8 @@ impl Canvas {
     /// Dots or crosses sized by `pen`, as one element, since there may be thousands.
     pub(super) fn scattered(&mut self, points: impl Iterator<Item = Point>, crosses: bool, pen: Pen) {
         let mark = |(x, y): Point| match crosses {
-            true => format!("M{} {}l6 6m0 -6l-6 6", fine(x - 3.0), fine(y - 3.0)),
-            false => format!("M{} {}h0", fine(x), fine(y)),
+            true => format!("M{} {}l6 6m0 -6l-6 6", rounded(x - 3.0), rounded(y - 3.0)),
+            false => format!("M{} {}h0", rounded(x), rounded(y)),
         };
         let strokes = Strokes::new()
             .set("d", points.map(mark).collect::<String>())
@@ -130,7 +130,8 @@ impl Canvas {
 
     /// A circle with this radius in pixels, filled and then outlined.
     pub(super) fn circle(&mut self, centre: Point, radius: f64, fill: ([u8; 3], f64), pen: Pen) {
-        let circle = Circle::new().set("cx", fine(centre.0)).set("cy", fine(centre.1)).set("r", fine(radius));
+        let circle =
+            Circle::new().set("cx", rounded(centre.0)).set("cy", rounded(centre.1)).set("r", rounded(radius));
         let circle = circle.set("stroke", hex(pen.colour)).set("stroke-width", pen.width);
         self.add(filled(circle, fill.0, fill.1));
     }
@@ -143,7 +144,7 @@ impl Canvas {
         pen: Pen,
     ) {
         let ring = |points: &mut dyn Iterator<Item = Point>| {
-            let points: Vec<_> = points.map(|(x, y)| format!("{} {}", fine(x), fine(y))).collect();
+            let points: Vec<_> = points.map(|(x, y)| format!("{} {}", rounded(x), rounded(y))).collect();
             format!("M{}Z", points.join("L"))
         };
         let strokes = Strokes::new()
@@ -161,7 +162,7 @@ impl Canvas {
 
     /// A text that runs upwards, centred at `at`.
     pub(super) fn upward_text(&mut self, text: &str, at: Point, size: f64, colour: [u8; 3]) {
-        let turn = format!("rotate(-90 {} {})", fine(at.0), fine(at.1));
+        let turn = format!("rotate(-90 {} {})", rounded(at.0), rounded(at.1));
         self.add(written(text, at, size, Anchor::Middle, colour).set("transform", turn));
     }
 
@@ -193,10 +194,10 @@ impl Canvas {
         let mut definitions = Definitions::new();
         for (index, [left, top, right, bottom]) in self.clips.iter().enumerate() {
             let area = Rectangle::new()
-                .set("x", fine(*left))
-                .set("y", fine(*top))
-                .set("width", fine(right - left))
-                .set("height", fine(bottom - top));
+                .set("x", rounded(*left))
+                .set("y", rounded(*top))
+                .set("width", rounded(right - left))
+                .set("height", rounded(bottom - top));
             definitions = definitions.add(ClipPath::new().set("id", self.clip_id(index)).add(area));
         }
         let (width, height) = self.size;
@@ -219,8 +220,8 @@ fn written(text: &str, at: Point, size: f64, anchor: Anchor, colour: [u8; 3]) ->
         Anchor::Middle => ("middle", MIDDLE),
     };
     Text::new(text)
-        .set("x", fine(at.0))
-        .set("y", fine(at.1))
+        .set("x", rounded(at.0))
+        .set("y", rounded(at.1))
         .set("dy", down)
         .set("font-size", size)
         .set("text-anchor", across)
@@ -236,11 +237,11 @@ fn filled<E: Node>(mut element: E, colour: [u8; 3], opacity: f64) -> E {
 }
 
 fn coordinates(points: &[Point]) -> Vec<(f64, f64)> {
-    points.iter().map(|point| (fine(point.0), fine(point.1))).collect()
+    points.iter().map(|point| (rounded(point.0), rounded(point.1))).collect()
 }
 
 /// A length in pixels, rounded to two decimals. Adding 0 removes the sign of a zero.
-fn fine(length: f64) -> f64 {
+fn rounded(length: f64) -> f64 {
     (length * 100.0).round() / 100.0 + 0.0
 }
 
