@@ -1,4 +1,4 @@
-//! Data that reading records besides the model: the positions of its parts, and the values that could not be
+//! What reading records besides the model: the positions of its parts, and the values that could not be
 //! read. The parts that both versions of the standard write alike are read here.
 
 use crate::rules::{Place, UnknownList, Unread};

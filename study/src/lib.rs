@@ -11,7 +11,7 @@
 //! cases                vehicles, settings and nominal controllers
 //! table                rows of cells: text, CSV, JSON, Markdown, HTML
 //! baseline             the methods that are compared
-//! trial                one closed loop, and what is measured of it
+//! trial                one closed loop and its measurements
 //! search               the best parameters of a method
 //! always               what survives bounds and any u_ref
 //! bicycles             the kinematic bicycle's models and remedies
@@ -55,7 +55,7 @@ pub use table::{Cell, Table};
 pub struct Options {
     /// Random starts of every table, 1 to 100.
     pub runs: usize,
-    /// Number of seeds: 1 to this number are used.
+    /// Number of seeds; seeds 1 to this number are used.
     pub seeds: u64,
     /// Starts of the parameter search on its first pass and on its second, and the number of candidates that
     /// reach the second.

@@ -157,7 +157,7 @@ pub enum IntervalVariability {
     Fixed,
     /// Can be changed by tunable parameters.
     Tunable,
-    /// Given anew at each tick.
+    /// Given again at each tick.
     Changing,
     /// Given at some events as the time until the next tick.
     Countdown,
