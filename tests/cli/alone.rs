@@ -39,14 +39,14 @@ fn a_run_says_how_much_of_u_ref_was_changed() {
                 experiment = { stop_time = 3.0, step_size = 0.02 }\n\
                 [plant]\nstates = [{ name = \"x\" }]\ninputs = [{ name = \"u\", min = -2.0, max = 2.0 }]\n\
                 derivatives = { x = \"u\" }\n[[barrier]]\nname = \"wall\"\nexpression = \"1 - x\"\n";
-    let told = |wanted: &str, json: &[&str]| {
+    let printed = |wanted: &str, json: &[&str]| {
         workshop.write("my.toml", file.replace("WANTED", wanted));
         workshop.punctual(["run", "my.toml"].into_iter().chain(json.iter().copied())).success()
     };
-    let away = told("-0.5", &[]);
+    let away = printed("-0.5", &[]);
     assert!(away.contains("\nfilter left u_ref as it is at all 151 samples.\nEvery promise"), "{away}");
     // The change is twice the bound. The bounds are 4 apart, so a change of 1 is a quarter.
-    let report: Value = serde_json::from_str(&told("1.0", &["--json"])).expect("JSON");
+    let report: Value = serde_json::from_str(&printed("1.0", &["--json"])).expect("JSON");
     let of = &report["interference"][0];
     let [samples, changed] = ["samples", "changed"].map(|key| of[key].as_u64().expect("a number"));
     let [mean, most] = ["mean", "most"].map(|key| of[key].as_f64().expect("a number"));
@@ -54,7 +54,7 @@ fn a_run_says_how_much_of_u_ref_was_changed() {
     assert!(samples == 151 && changed > 75 && changed < 140, "{of}");
     assert!(mean > 0.1 && mean <= most && most <= 0.25 + 1e-9, "{of}");
     assert_eq!(of["filter"], "filter");
-    let towards = told("1.0", &[]);
+    let towards = printed("1.0", &[]);
     let shown = format!("\nfilter changed u_ref at {changed} of 151 samples (");
     assert!(towards.contains(&shown) && towards.contains(" % of the bounds in the mean and "), "{towards}");
 }
@@ -531,11 +531,12 @@ fn an_interrupted_run_keeps_its_rows() {
     std::thread::sleep(Duration::from_secs(1));
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill").success());
     assert_eq!(child.wait().expect("a child").code(), Some(130));
-    let mut told = String::new();
-    std::io::Read::read_to_string(&mut child.stderr.take().expect("piped"), &mut told).expect("UTF-8");
+    let mut printed = String::new();
+    std::io::Read::read_to_string(&mut child.stderr.take().expect("piped"), &mut printed).expect("UTF-8");
     assert!(
-        told.starts_with("note: what was recorded until then is in out/car.csv\nerror: interrupted at t = "),
-        "{told}"
+        printed
+            .starts_with("note: what was recorded until then is in out/car.csv\nerror: interrupted at t = "),
+        "{printed}"
     );
     assert!(Table::parse(&workshop.text("out/car.csv")).len() > 1);
 }

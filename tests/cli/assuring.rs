@@ -86,8 +86,11 @@ fn what_cannot_be_promised_is_refused() {
     );
     assert!(done.stdout.contains("earliest deadline with a plan: goal 3."), "{}", done.stdout);
     let run = workshop.punctual(["run", "system.toml", "--out", "out"]);
-    let told = format!("{}{}", run.stdout, run.stderr);
-    assert!(told.contains("the guarantee is refused") && told.contains("goal is not met at 2.5"), "{told}");
+    let printed = format!("{}{}", run.stdout, run.stderr);
+    assert!(
+        printed.contains("the guarantee is refused") && printed.contains("goal is not met at 2.5"),
+        "{printed}"
+    );
 }
 
 /// Anything that plans do not support is an error that names it.

@@ -540,8 +540,11 @@ fn a_report_has_the_runs_and_how_to_see_them_again() {
     assert!(texts.iter().any(|text| text.starts_with(&rate)), "{texts:?}");
     let [low, high] = [0, 1].map(|end| report["success"]["interval"][end].as_f64().expect("a number"));
     let interval = texts.iter().find(|text| text.starts_with("The rate of success is ")).expect("a sentence");
-    let told: Vec<f64> = interval.split([' ', '\u{202f}']).filter_map(|word| word.parse().ok()).collect();
-    assert!((told[0] - 100.0 * low).abs() < 0.005 && (told[1] - 100.0 * high).abs() < 0.005, "{interval}");
+    let printed: Vec<f64> = interval.split([' ', '\u{202f}']).filter_map(|word| word.parse().ok()).collect();
+    assert!(
+        (printed[0] - 100.0 * low).abs() < 0.005 && (printed[1] - 100.0 * high).abs() < 0.005,
+        "{interval}"
+    );
     assert!(interval.contains("a rough guide"), "{interval}");
     let cells = cells(&tree);
     let row = |name: &str| cells.iter().find(|row| row[0] == name).unwrap_or_else(|| panic!("no {name}"));
@@ -1035,10 +1038,10 @@ fn a_rare_estimate_can_be_ended_at_any_point() {
         let output = child.wait_with_output().expect("a child");
         assert_eq!(output.status.code(), (ending == "-INT").then_some(130));
         before = kept().expect("repeats");
-        let told = String::from_utf8_lossy(&output.stderr);
+        let printed = String::from_utf8_lossy(&output.stderr);
         let note =
             format!("interrupted with {before} of 10000 repeats kept; the same command goes on from there");
-        assert_eq!(told.contains(&note), ending == "-INT", "{told}");
+        assert_eq!(printed.contains(&note), ending == "-INT", "{printed}");
     }
     // Another campaign does not resume from there.
     let text = workshop.text("c.toml");

@@ -69,10 +69,10 @@ fn a_filter_that_is_given_the_derivatives() {
     }
     let text = fs::read_to_string(workshop.path("external.toml")).expect("written above");
     workshop.write("zero.toml", text.replace("margin = 0.05", "margin = 0.0 "));
-    let told = workshop.punctual(["check", "zero.toml"]).success();
+    let printed = workshop.punctual(["check", "zero.toml"]).success();
     let wanted =
         "warning: goal, speed: the margin is 0, so that an input held over 0.01 s can cost the deadline\n";
-    assert!(told.contains(wanted), "{told}");
+    assert!(printed.contains(wanted), "{printed}");
 }
 
 #[test]
@@ -425,17 +425,17 @@ fn a_plant_to_simulate_is_simulated_or_it_is_said() {
 inputs = [{ name = "u_x" }, { name = "u_y" }]
 derivatives = { x_p = "v_x", y_p = "v_y", v_x = "u_x - 0.5", v_y = "u_y" }"#;
     workshop.write("alike.toml", simulated(alike));
-    let told = workshop.punctual(["check", "alike.toml"]).stdout;
-    assert!(told.contains("closed loop with the u_ref of the file"), "{told}");
-    assert!(told.contains("warning: the closed loop has the plant in `simulated`"), "{told}");
+    let printed = workshop.punctual(["check", "alike.toml"]).stdout;
+    assert!(printed.contains("closed loop with the u_ref of the file"), "{printed}");
+    assert!(printed.contains("warning: the closed loop has the plant in `simulated`"), "{printed}");
     let lagged = alike
         .replace("{ name = \"v_y\" }", "{ name = \"v_y\" }, { name = \"w\" }")
         .replace("v_y = \"u_y\"", "v_y = \"w\", w = \"10*(u_y - w)\"");
     workshop.write("lagged.toml", simulated(&lagged));
-    let told = workshop.punctual(["check", "lagged.toml"]).stdout;
+    let printed = workshop.punctual(["check", "lagged.toml"]).stdout;
     assert!(
-        told.contains("since `simulated` has other states or inputs, and not the file's u_ref"),
-        "{told}"
+        printed.contains("since `simulated` has other states or inputs, and not the file's u_ref"),
+        "{printed}"
     );
 }
 
@@ -486,14 +486,14 @@ fn sets_that_are_apart_are_refused_by_name() {
 #[test]
 fn a_run_says_what_check_knows() {
     let workshop = Workshop::new();
-    let told = |barriers: &str| {
+    let printed = |barriers: &str| {
         workshop.write("filter.toml", point_mass(BOUNDS, barriers));
         let done = workshop.punctual(["run", "filter.toml"]);
         format!("{}{}", done.stdout, done.stderr)
     };
-    let soon = told(&disc("goal", "disc", [30.0, 0.0], 1.0, "deadline = 4.0"));
+    let soon = printed(&disc("goal", "disc", [30.0, 0.0], 1.0, "deadline = 4.0"));
     assert!(soon.contains("earliest deadline with a plan: goal "), "{soon}");
-    let root = told(&disc(
+    let root = printed(&disc(
         "goal",
         "quadratic_disc",
         [10.0, 0.0],

@@ -8,19 +8,19 @@ use crate::workshop::{Workshop, examples};
 #[track_caller]
 fn failure(workshop: &Workshop, arguments: &[&str]) -> Value {
     let plain = workshop.punctual(arguments);
-    let told = workshop.punctual(arguments.iter().chain(&["--json"]));
-    assert_eq!((plain.code, plain.stdout.as_str()), (told.code, ""), "{arguments:?}");
+    let with_json = workshop.punctual(arguments.iter().chain(&["--json"]));
+    assert_eq!((plain.code, plain.stdout.as_str()), (with_json.code, ""), "{arguments:?}");
     // The usage that clap prints includes the options that were given.
-    assert_eq!(plain.stderr, told.stderr.replace(" --json", ""), "{arguments:?}");
+    assert_eq!(plain.stderr, with_json.stderr.replace(" --json", ""), "{arguments:?}");
     let printed: Value =
-        serde_json::from_str(&told.stdout).unwrap_or_else(|e| panic!("{e}: {}", told.stdout));
+        serde_json::from_str(&with_json.stdout).unwrap_or_else(|e| panic!("{e}: {}", with_json.stdout));
     let object = printed.as_object().expect("an object");
     assert_eq!(object.len(), 1, "{printed}");
     let error = object["error"].clone();
-    assert_eq!(error["code"], told.code, "{error}");
+    assert_eq!(error["code"], with_json.code, "{error}");
     // What the parts say is also on stderr.
     for part in ["file", "component", "field"].iter().filter_map(|part| error[*part].as_str()) {
-        assert!(told.stderr.contains(part), "{part} in {}", told.stderr);
+        assert!(with_json.stderr.contains(part), "{part} in {}", with_json.stderr);
     }
     error
 }

@@ -140,10 +140,10 @@ fn outside_without_a_deadline_nothing_is_promised() {
             "side: outside at the start and without a deadline: nothing is promised; give it a deadline";
         let done = workshop.punctual(["check", "filter.toml", "--plant", "plant.toml"]);
         assert!(done.code == 1 && done.stdout.contains(&format!("warning: {words}")), "{done:#?}");
-        let told = words.replace("side:", "filter.side:");
+        let printed = words.replace("side:", "filter.side:");
         for (require, code) in [("kept", 1), ("on_time_and_inside", 1)] {
             let done = workshop.punctual(["run", "system.toml", "--require", require]);
-            assert!(done.code == code && done.stderr.contains(&told), "{done:#?}");
+            assert!(done.code == code && done.stderr.contains(&printed), "{done:#?}");
             assert!(done.stdout.contains("nothing promised"), "{done:#?}");
         }
     }
@@ -261,9 +261,9 @@ fn check_says_what_a_run_does() {
         assert!(text.contains("closed loop with u_ref = 0 (--u-ref none)"), "{text}");
         assert!(kept || !text.contains("and the closed loop keeps it\n"), "{text}");
         let notes = ran["notes"].as_array().expect("a list");
-        let told =
+        let printed =
             |note: &Value| note.as_str().is_some_and(|n| n.contains("nothing feeds u_ref.u_x, u_ref.u_y"));
-        assert!(notes.iter().any(told), "{ran}");
+        assert!(notes.iter().any(printed), "{ran}");
         let (_, damped) = check(&workshop, &["--u-ref", "damping"]);
         assert_eq!(damped["closed_loop"]["u_ref"], "damping as u_ref (--u-ref damping)");
     }

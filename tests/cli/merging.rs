@@ -69,9 +69,9 @@ fn two_systems_become_one() {
     let workshop = two_systems();
     let done = workshop.punctual(["merge", "here.fmu", "there.fmu", "-o", "both.fmu"]);
     assert_eq!(done.stderr, "");
-    let told =
+    let printed =
         format!("both.fmu: unicycle_filter for {OTHER} (there.fmu), {PLATFORM} (here.fmu), guid {{GUID}}\n");
-    assert_eq!(without_guids(&done.success()), told);
+    assert_eq!(without_guids(&done.success()), printed);
     let (here, there) = (entries(&workshop, "here.fmu"), entries(&workshop, "there.fmu"));
     assert_eq!((here.len(), there.len()), (6, 6));
     let mut union = here.clone();
@@ -127,8 +127,8 @@ fn what_is_told_as_json() {
          note: `punctual validate both.fmu` finds errors (1)\n"
     );
     assert_eq!(done.stderr, notes);
-    let told = without_guids(&done.success());
-    assert_golden("merge.json", &told.replace(&format!("library for {PLATFORM}"), "library for PLATFORM"));
+    let printed = without_guids(&done.success());
+    assert_golden("merge.json", &printed.replace(&format!("library for {PLATFORM}"), "library for PLATFORM"));
 }
 
 /// FMUs of another tool that contain the time of writing, in the style of each system.
@@ -144,8 +144,8 @@ fn fmus_of_others_may_say_when_they_were_written() {
     write(&workshop, "b.fmu", &b);
     for files in [["a.fmu", "b.fmu"], ["b.fmu", "a.fmu"]] {
         let done = workshop.punctual(["merge", files[0], files[1], "-o", "both.fmu"]);
-        let told = format!("both.fmu: misbehaving for {PLATFORM} (a.fmu), win64 (b.fmu), guid none\n");
-        assert_eq!(done.success(), told);
+        let printed = format!("both.fmu: misbehaving for {PLATFORM} (a.fmu), win64 (b.fmu), guid none\n");
+        assert_eq!(done.success(), printed);
         let both = entries(&workshop, "both.fmu");
         assert!(both["modelDescription.xml"] == a["modelDescription.xml"], "not the earlier one");
         assert_eq!(both.len(), 3);
@@ -201,18 +201,18 @@ fn what_differs_is_refused() {
             with(&format!("binaries/{OTHER}/unicycle_filter{}", std::env::consts::DLL_SUFFIX), None),
         ),
     ];
-    let mut told = String::new();
+    let mut printed = String::new();
     for (what, entries) in cases {
         write(&workshop, "other.fmu", &entries);
         let done = workshop.punctual(["merge", "here.fmu", "other.fmu", "-o", "both.fmu"]);
         assert_eq!((done.code, done.stdout.as_str()), (1, ""), "{what}: {done:?}");
         assert!(!workshop.files().contains(&"both.fmu".to_owned()), "{what}");
-        told += &format!("{what}\n    {}", done.stderr);
+        printed += &format!("{what}\n    {}", done.stderr);
     }
-    let told = without_guids(&told);
+    let printed = without_guids(&printed);
     assert_golden(
         "merge-refused.txt",
-        &told.replace(PLATFORM, "PLATFORM").replace(env!("CARGO_PKG_VERSION"), "VERSION"),
+        &printed.replace(PLATFORM, "PLATFORM").replace(env!("CARGO_PKG_VERSION"), "VERSION"),
     );
 }
 

@@ -363,12 +363,12 @@ fn inputs_that_a_campaign_varies() {
 fn a_step_longer_than_the_deadline() {
     let workshop = Workshop::with_fmus();
     let start = "fmu = \"filter.fmu\"\nstart = { \"goal.deadline\" = 0.5 }";
-    for (step, told) in [("1.0", true), ("0.5", false)] {
+    for (step, warned) in [("1.0", true), ("0.5", false)] {
         let text = system(&[("step = 0.001", &format!("step = {step}")), ("fmu = \"filter.fmu\"", start)]);
         workshop.write("system.toml", text);
         let done = workshop.punctual(["run", "system.toml"]);
         let note = "note: filter.goal: the deadline of 0.5 s is shorter than the step of 1 s: nothing is measured until it is \
                     over\n";
-        assert_eq!((done.code, done.stderr.contains(note)), (1, told), "{done:?}");
+        assert_eq!((done.code, done.stderr.contains(note)), (1, warned), "{done:?}");
     }
 }

@@ -41,18 +41,18 @@ fn own_model() -> Workshop {
 #[test]
 fn the_page_on_own_models_is_what_happens() {
     let (workshop, text) = (own_model(), document("own-model.md"));
-    let mut told = String::new();
+    let mut printed = String::new();
     for block in blocks(&text, "console") {
         for line in block.lines().filter_map(|line| line.strip_prefix("$ punctual ")) {
             let stdout = workshop.punctual(line.split(' ')).success();
             if line.starts_with("check") {
                 assert_eq!(block, format!("$ punctual {line}\n{stdout}"));
             }
-            told = stdout;
+            printed = stdout;
         }
     }
     for line in blocks(&text, "text").concat().lines() {
-        assert!(told.contains(line), "{line:?} in {told}");
+        assert!(printed.contains(line), "{line:?} in {printed}");
     }
     assert!(workshop.files().contains(&"out".to_owned()));
 }
@@ -104,14 +104,14 @@ fn an_output_is_an_expression_of_states() {
     workshop.write("system.toml", system);
     workshop.punctual(["run", "system.toml", "--out", "out"]).success();
     let table = Table::parse(&workshop.text("out/system.csv"));
-    let [told, v, theta, x, along] =
+    let [output, v, theta, x, along] =
         ["car.y.v_x", "car.x.v", "car.x.theta", "follower.x.x", "car.x.x_p"].map(|name| table.column(name));
-    for i in 0..told.len() {
-        assert!((told[i] - v[i] * theta[i].cos()).abs() < 1e-12, "{i}: {}", told[i]);
+    for i in 0..output.len() {
+        assert!((output[i] - v[i] * theta[i].cos()).abs() < 1e-12, "{i}: {}", output[i]);
     }
     // Held over 0.1 s, the speed is off by half of its change: 0.07 m of 2.2 m.
-    let last = told.len() - 1;
-    assert!(told[0] == 2.0 && along[last] > 2.0 && (x[last] - along[last]).abs() < 0.15, "{}", x[last]);
+    let last = output.len() - 1;
+    assert!(output[0] == 2.0 && along[last] > 2.0 && (x[last] - along[last]).abs() < 0.15, "{}", x[last]);
 }
 
 /// A car whose jerk is off by up to 3 m/s³, with a filter that accounts for it: the promise is kept, the same
@@ -200,8 +200,8 @@ fn rows(stem: &str) -> Vec<String> {
     }
     let (filter, plant) = (format!("{stem}-filter.toml"), format!("{stem}-plant.toml"));
     // `check` runs with u_ref = 0, which not all examples use.
-    let told = workshop.punctual(["check", &filter, "--plant", &plant, "--json"]).stdout;
-    let told: serde_json::Value = serde_json::from_str(&told).expect("JSON");
+    let printed = workshop.punctual(["check", &filter, "--plant", &plant, "--json"]).stdout;
+    let printed: serde_json::Value = serde_json::from_str(&printed).expect("JSON");
     for toml in [&filter, &plant] {
         workshop.punctual(["build", toml, "-o", &toml.replace(".toml", ".fmu")]).success();
     }
@@ -217,7 +217,7 @@ fn rows(stem: &str) -> Vec<String> {
         text.lines().filter_map(|line| line.strip_prefix("expression = \"")?.split('"').next());
     let time = table.column("time");
     let mut rows = Vec::new();
-    for barrier in told["barriers"].as_array().expect("barriers") {
+    for barrier in printed["barriers"].as_array().expect("barriers") {
         let name = barrier["name"].as_str().expect("a name");
         let (degree, unit) = (&barrier["relative_degree"], barrier["unit"].as_str().expect("a unit"));
         let given = barrier["deadline"].as_f64();

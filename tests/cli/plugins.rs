@@ -156,7 +156,7 @@ const FILTER: &str =
 fn libraries_that_are_refused() {
     let workshop = Workshop::with_library();
     workshop.write("f.toml", FILTER);
-    let mut told = String::new();
+    let mut printed = String::new();
     for macros in [
         "NO_SYMBOL",
         "MODEL=NULL",
@@ -203,17 +203,17 @@ fn libraries_that_are_refused() {
         fixture(&workshop, &macros.split(", -D").collect::<Vec<_>>());
         let done = workshop.punctual(["build", "f.toml", "-o", "f.fmu"]);
         assert_eq!((done.code, done.stdout.as_str()), (2, ""), "{macros}: {done:?}");
-        told += &format!("{macros}\n    {}", done.stderr);
+        printed += &format!("{macros}\n    {}", done.stderr);
         assert!(!workshop.files().contains(&"f.fmu".to_owned()), "{macros}");
     }
-    let told = told.replace(&plugin_file_name("fixture"), "LIBRARY");
-    assert_golden("plugins-refused.txt", &told);
+    let printed = printed.replace(&plugin_file_name("fixture"), "LIBRARY");
+    assert_golden("plugins-refused.txt", &printed);
     let page = fs::read_to_string(root().join("docs/plugin.md")).expect("the page");
     let messages: Vec<_> =
         page.lines().filter_map(|line| line.split_once("| `plant.")?.1.strip_suffix("` |")).collect();
     assert_eq!(messages.len(), 5);
     for message in messages {
-        assert!(told.contains(&format!(" f.toml: plant.{message}\n")), "docs/plugin.md says {message:?}");
+        assert!(printed.contains(&format!(" f.toml: plant.{message}\n")), "docs/plugin.md says {message:?}");
     }
 }
 
@@ -224,7 +224,7 @@ fn configurations_that_are_refused() {
     fixture(&workshop, &[]);
     let head = "kind = \"filter\"\n[plant]\nplugin = \"fixture\"\n";
     let wall = "[[barrier]]\nname = \"wall\"\ndeadline = 2.0\n";
-    let mut told = String::new();
+    let mut printed = String::new();
     for text in [
         FILTER.replace("\"fixture\"", "\"other\""),
         FILTER.replace("\"fixture\"", "\"../fixture\""),
@@ -255,13 +255,16 @@ fn configurations_that_are_refused() {
         workshop.write("f.toml", &text);
         let done = workshop.punctual(["check", "f.toml"]);
         assert_eq!((done.code, done.stdout.as_str()), (2, ""), "{text}: {done:?}");
-        told += &format!("{}    {}", text.split_once('\n').expect("lines").1, done.stderr);
+        printed += &format!("{}    {}", text.split_once('\n').expect("lines").1, done.stderr);
     }
-    let told =
-        told.replace(&plugin_file_name("fixture"), "LIBRARY").replace(&plugin_file_name("other"), "OTHER");
+    let printed =
+        printed.replace(&plugin_file_name("fixture"), "LIBRARY").replace(&plugin_file_name("other"), "OTHER");
     // The digest depends on the bytes that the compiler wrote.
-    let digest = told.split("has \"").nth(1).and_then(|rest| rest.get(..36)).expect("a digest").to_owned();
-    assert_golden("plugins-configured.txt", &told.replace(&digest, "DIGEST").replace(PLATFORM, "PLATFORM"));
+    let digest = printed.split("has \"").nth(1).and_then(|rest| rest.get(..36)).expect("a digest").to_owned();
+    assert_golden(
+        "plugins-configured.txt",
+        &printed.replace(&digest, "DIGEST").replace(PLATFORM, "PLATFORM"),
+    );
 }
 
 /// A file other than the one the FMU was built with is refused before any of it runs, since a truncated
@@ -288,8 +291,8 @@ fn the_guid_and_the_fmu_depend_on_the_library() {
     workshop.write("f.toml", FILTER);
     let build = |macros: &[&str]| {
         fixture(&workshop, macros);
-        let told = workshop.punctual(["build", "f.toml", "-o", "f.fmu"]).success();
-        (told, workshop.bytes("f.fmu"))
+        let printed = workshop.punctual(["build", "f.toml", "-o", "f.fmu"]).success();
+        (printed, workshop.bytes("f.fmu"))
     };
     let (first, again, second) = (build(&[]), build(&[]), build(&["OWN_SINE"]));
     assert!(first == again, "{} and {}", first.0, again.0);
@@ -346,18 +349,18 @@ fn an_fmu_of_two_systems_has_the_digests_of_both() {
     let (_, here) = build("here.fmu", &[], "");
     let (theirs, there) = build("there.fmu", &["OWN_SINE"], "");
     assert_ne!(here.success(), there.success());
-    let told = merge().stderr;
+    let printed = merge().stderr;
     let advice = "; the GUID of an FMU with a plug-in is made from its library too: build with a plugin_digest for \
                   every platform (docs/plugin.md)\n";
-    assert!(told.starts_with(
+    assert!(printed.starts_with(
         "error: there.fmu: cannot be merged: modelDescription.xml differs from here.fmu's: guid"
     ));
-    assert!(told.ends_with(advice), "{told}");
+    assert!(printed.ends_with(advice), "{printed}");
 
     // The messages of a build without digests contain them.
     let digest = |macros: &[&str]| {
-        let told = build("x.fmu", macros, &format!(", plugin_digest = {{ {OTHER} = \"\" }}")).1.stderr;
-        told.split("has \"").nth(1).and_then(|rest| rest.get(..36)).expect("a digest").to_owned()
+        let printed = build("x.fmu", macros, &format!(", plugin_digest = {{ {OTHER} = \"\" }}")).1.stderr;
+        printed.split("has \"").nth(1).and_then(|rest| rest.get(..36)).expect("a digest").to_owned()
     };
     let digests = format!(
         ", plugin_digest = {{ {OTHER} = {:?}, {PLATFORM} = {:?} }}",
@@ -387,8 +390,8 @@ fn outside_the_domain_nothing_crashes() {
     fixture(&workshop, &["STOPS"]);
     workshop.write("f.toml", FILTER.replace("wall", "root"));
     for (x, status) in [("x=0.5", "unchanged"), ("x=-4", "singular")] {
-        let told = workshop.punctual(["check", "f.toml", "--x0", x]);
-        assert!(told.stdout.contains(&format!("u_ref = 0: {status}\n")), "{told:?}");
+        let printed = workshop.punctual(["check", "f.toml", "--x0", x]);
+        assert!(printed.stdout.contains(&format!("u_ref = 0: {status}\n")), "{printed:?}");
     }
     workshop.write("p.toml", "kind = \"plant\"\nplant.plugin = \"fixture\"\nx0.v = 1.0\n");
     workshop.punctual(["build", "p.toml", "-o", "p.fmu"]).success();
@@ -396,8 +399,8 @@ fn outside_the_domain_nothing_crashes() {
          start = { \"u.u\" = 0.0 }\n";
     workshop.write("s.toml", system);
     let done = workshop.punctual(["run", "s.toml", "--out", "out"]);
-    let told = ["error: fmi2DoStep of p (p.fmu) at t = 1.1 s returned fmi2Error", "x.x becomes NaN"];
-    assert!(done.code == 1 && told.iter().all(|part| done.stderr.contains(part)), "{done:?}");
+    let parts = ["error: fmi2DoStep of p (p.fmu) at t = 1.1 s returned fmi2Error", "x.x becomes NaN"];
+    assert!(done.code == 1 && parts.iter().all(|part| done.stderr.contains(part)), "{done:?}");
 }
 
 /// A function given by its derivatives equals the function: the sine of the header and one implemented in the

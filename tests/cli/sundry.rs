@@ -204,8 +204,9 @@ fn each_defect_of_a_step_names_the_component() {
     ] {
         let done = run(&workshop(defect, &[]), &still);
         let error = format!("error: fmi3DoStep of b (b.fmu) at t = 0.2 s {message}\n");
-        let told = done.stderr.ends_with(&error) || done.stderr.ends_with(&error.replace("0.2 s", "0.3 s"));
-        assert!(done.code == 1 && told, "{defect}: {done:#?}");
+        let printed =
+            done.stderr.ends_with(&error) || done.stderr.ends_with(&error.replace("0.2 s", "0.3 s"));
+        assert!(done.code == 1 && printed, "{defect}: {done:#?}");
     }
     let done = run(&workshop("off-in-step", &[]), &still);
     let note = "note: b: its step to t = 0.3 s reached t = 0.29 s (lastSuccessfulTime), and others after it may too\n";
@@ -425,10 +426,10 @@ fn a_trial_takes_steps_back() {
         let moving = [("start=\"0 0\"", "start=\"1 1\"")];
         write_sundry(&workshop, "x.fmu", sundry(defect, &moving), &["MOVING"]);
         let (_, found) = listed(&workshop, &[]);
-        let told = found
+        let printed = found
             .iter()
             .any(|f| f.starts_with("warning trial.state trial y[1]: is ") && f.contains(expected));
-        assert!(told, "{defect}: {found:#?}");
+        assert!(printed, "{defect}: {found:#?}");
     }
 }
 

@@ -42,8 +42,11 @@ impl Done {
     #[track_caller]
     pub(crate) fn fails_like(self, code: i32, begin: &str, parts: &[&str]) {
         let begin = format!("error: {begin}");
-        let told = self.stderr.starts_with(&begin) && parts.iter().all(|part| self.stderr.contains(part));
-        assert!(self.code == code && self.stdout.is_empty() && told, "wanted {begin}, {parts:?}: {self:#?}");
+        let printed = self.stderr.starts_with(&begin) && parts.iter().all(|part| self.stderr.contains(part));
+        assert!(
+            self.code == code && self.stdout.is_empty() && printed,
+            "wanted {begin}, {parts:?}: {self:#?}"
+        );
     }
 }
 

@@ -70,8 +70,8 @@ def test_every_column_has_its_unit_and_meaning_as_metadata(campaign):
     columns = json.loads(schema.metadata[b"punctual.columns"])
     assert [field.name for field in schema] == [column["name"] for column in columns]
     for field, column in zip(schema, columns):
-        told = {key.encode(): column[key].encode() for key in ("unit", "description") if column[key]}
-        assert field.metadata == told, field
+        expected = {key.encode(): column[key].encode() for key in ("unit", "description") if column[key]}
+        assert field.metadata == expected, field
     assert schema.field("plant.x0.v").metadata[b"unit"] == b"m/s"
     kinds = [str(schema.field(name).type) for name in ("run", "plant.x0.v", "success", "failure")]
     assert kinds == ["int64", "double", "bool", "string"]

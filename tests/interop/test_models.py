@@ -17,8 +17,8 @@ def car(tmp_path_factory):
     folder = tmp_path_factory.mktemp("car")
     for name in ["jerk-car-filter", "jerk-car-plant", "jerk-car"]:
         shutil.copy(ROOT / "examples" / "models" / f"{name}.toml", folder)
-    told = punctual("check", "jerk-car-filter.toml", "--plant", "jerk-car-plant.toml", cwd=folder).stdout
-    assert "relative degree  3" in told and "on course" in told
+    printed = punctual("check", "jerk-car-filter.toml", "--plant", "jerk-car-plant.toml", cwd=folder).stdout
+    assert "relative degree  3" in printed and "on course" in printed
     for name in ["jerk-car-filter", "jerk-car-plant"]:
         punctual("build", f"{name}.toml", "-o", f"{name}.fmu", cwd=folder)
     return folder

@@ -16,6 +16,6 @@ mod survival;
 
 /// Number of cases: `full` in `tests/nightly`, `quick` here.
 fn cases(quick: u64, full: u64) -> u64 {
-    let told = std::env::var("PUNCTUAL_ASSURED").ok().and_then(|n| n.parse().ok());
-    told.unwrap_or(if std::env::var_os("PUNCTUAL_TABLES").is_some() { full } else { quick })
+    let given = std::env::var("PUNCTUAL_ASSURED").ok().and_then(|n| n.parse().ok());
+    given.unwrap_or(if std::env::var_os("PUNCTUAL_TABLES").is_some() { full } else { quick })
 }

@@ -139,10 +139,10 @@ fn assert_flags_are_kept(all: &[(Family, Tally)]) {
 /// Draws all 100,000 in `tests/nightly`; with `PUNCTUAL_JUDGE`, that many per family.
 #[test]
 fn table_of_promises() {
-    let told = std::env::var("PUNCTUAL_JUDGE").ok().and_then(|n| n.parse().ok());
+    let given = std::env::var("PUNCTUAL_JUDGE").ok().and_then(|n| n.parse().ok());
     let all = std::env::var_os("PUNCTUAL_TABLES").is_some();
-    let count = told.unwrap_or(if all { 3500 } else { 60 });
-    let found = table(count, if all || told.is_some() { 3 } else { 1 });
+    let count = given.unwrap_or(if all { 3500 } else { 60 });
+    let found = table(count, if all || given.is_some() { 3 } else { 1 });
     assert_none_broken(&found);
     assert_flags_are_kept(&found);
 }

@@ -224,7 +224,7 @@ fn recovery_does_not_claim_what_was_lost() {
         let case = Case {
             reference: Reference::Outwards(push),
             steps: Steps::Missed,
-            told: false,
+            announced: false,
             seed: i as u64,
             ..Case::plain(Plant::Chain(n), set, &[0.0; 2][..n], step)
         };

@@ -76,7 +76,7 @@ fn keeping() -> BarrierSettings {
 }
 
 /// Tells the filter the longest possible hold in s.
-fn told(builder: FilterBuilder, longest: f64) -> FilterBuilder {
+fn announce(builder: FilterBuilder, longest: f64) -> FilterBuilder {
     builder.period_max(longest).expect("a valid period")
 }
 
@@ -135,7 +135,7 @@ pub(crate) struct Case {
     /// The usual step in s, which the filter is given as the first.
     pub(crate) step: f64,
     /// Whether the filter is given the longest step.
-    pub(crate) told: bool,
+    pub(crate) announced: bool,
     /// Length of the run in s from the anchor.
     pub(crate) horizon: f64,
     /// Seed of the numbers drawn during the run.
@@ -157,7 +157,7 @@ impl Case {
             reference: Reference::Zero,
             steps: Steps::Regular,
             step,
-            told: true,
+            announced: true,
             seed: 1,
         }
     }
@@ -177,8 +177,8 @@ impl Case {
         let low = self.bounds.map(|bound| -bound);
         builder = builder.bounds(&low[..inputs], &self.bounds[..inputs]).expect("valid bounds");
         builder = builder.sampling(Sampling::Measured { first: Some(self.step) }).expect("a valid step");
-        if self.told {
-            builder = told(builder, self.longest());
+        if self.announced {
+            builder = announce(builder, self.longest());
         }
         builder.build().expect("a valid filter")
     }
@@ -194,8 +194,8 @@ impl Case {
     }
 
     /// The longest hold that the filter has been told.
-    pub(crate) fn longest_told(&self) -> f64 {
-        if self.told { self.longest() } else { self.step }
+    pub(crate) fn longest_announced(&self) -> f64 {
+        if self.announced { self.longest() } else { self.step }
     }
 
     /// The time of sample `k` + 1, if `t` is that of sample `k`.

@@ -144,9 +144,9 @@ fn common(plant: Plant, mut sets: Vec<Set>, start: &[f64], typical: [f64; 2], nu
     let start_time = if numbers.chance(0.5) { 0.0 } else { numbers.within(0.0, 100.0) };
     let steps = steps[numbers.below(5)];
     let case = Case::plain(plant, sets[0].clone(), start, step);
-    let told = numbers.chance(0.5);
+    let announced = numbers.chance(0.5);
     let bounds = [0, 1].map(|i| bounds[i] * typical[i]);
-    Case { sets, bounds, reference, steps, start_time, told, ..case }
+    Case { sets, bounds, reference, steps, start_time, announced, ..case }
 }
 
 /// A margin of 0 in half of the cases, else up to 5 % of `size`.

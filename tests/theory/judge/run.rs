@@ -335,7 +335,7 @@ impl<'a> Judge<'a> {
         let (h, s) = promised;
         let found = Break { time: t + s, sample: t, hold, h, size: h / floor, phase: said.phase };
         // A relative difference of 1e-9 is round-off, since times are sums.
-        let longer = hold > self.case.longest_told() * (1.0 + 1e-9);
+        let longer = hold > self.case.longest_announced() * (1.0 + 1e-9);
         keep_worst(&mut promise.left, found);
         if said.on_course {
             keep_worst(if longer { &mut promise.broken_longer } else { &mut promise.broken }, found);
