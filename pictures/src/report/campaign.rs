@@ -24,7 +24,7 @@ const STYLE: &str = include_str!("campaign.css");
 const NUMBERS: usize = 60_000;
 /// The fewest runs that are drawn if there are more.
 const FEWEST: usize = 500;
-/// Of the runs that are drawn, one in this many may be a later run that did not succeed.
+/// For this many of the first runs, one later run that did not succeed may be drawn as well.
 const LATER: usize = 4;
 /// About how many bars a histogram has.
 const BARS: f64 = 30.0;
