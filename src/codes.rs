@@ -1,4 +1,4 @@
-//! The exit codes: one table for all commands, from which `--help`, the man pages and docs/commands.md have them.
+//! The exit codes: one table for all commands, which `--help`, the man pages and docs/commands.md use.
 
 use std::fmt::Write;
 
@@ -12,7 +12,8 @@ pub const CODES: [(u8, &str); 4] = [
     (INTERRUPTED, "interrupted; what was done until then is kept"),
 ];
 
-/// What [`FOUND`] means for each command, in the order of `--help`; nothing for those that never end with it.
+/// What [`FOUND`] means for each command, in the order of `--help`. Commands that never end with it are not
+/// listed.
 pub const FOUND_BY: [(&str, &str); 13] = [
     ("new", ""),
     ("build", "the FMU that was made does not work"),
@@ -29,7 +30,7 @@ pub const FOUND_BY: [(&str, &str); 13] = [
     ("man", ""),
 ];
 
-/// The codes of a command, or of all where none is named: each with its meaning.
+/// The codes of a command, each with its meaning; those of all commands if none is named.
 pub fn of(command: Option<&str>) -> Vec<(u8, &'static str)> {
     let found = command.and_then(|name| FOUND_BY.iter().find(|(known, _)| *known == name));
     let own = |(code, means)| match found {
@@ -39,7 +40,7 @@ pub fn of(command: Option<&str>) -> Vec<(u8, &'static str)> {
     CODES.into_iter().map(own).filter(|(_, means)| !means.is_empty()).collect()
 }
 
-/// `program` with the codes at the end of the help of every command that is shown.
+/// `program` with the codes at the end of the help of every visible command.
 pub fn in_help(program: clap::Command) -> clap::Command {
     let program = FOUND_BY.iter().fold(program, |program, (name, _)| {
         program.mut_subcommand(name, |command| command.after_help(help(Some(name))))
@@ -50,7 +51,7 @@ pub fn in_help(program: clap::Command) -> clap::Command {
 fn help(command: Option<&str>) -> String {
     let mut text = "Exit codes:".to_owned();
     for (code, means) in of(command) {
-        // Writing to a text cannot fail.
+        // Writing to a string cannot fail.
         let _ = write!(text, "\n  {code:<3}  {means}");
     }
     text

@@ -1,4 +1,5 @@
-//! The commands of the `punctual` command line, over the crates that do the work. `main.rs` only parses arguments.
+//! The commands of the `punctual` command line, on top of the crates that do the work. `main.rs` only parses
+//! arguments.
 //!
 //! Each module uses only modules above it:
 //!
@@ -8,7 +9,7 @@
 //! command              one thin function per subcommand
 //! ```
 #![forbid(unsafe_code)]
-// Elementary functions are those of the core: clippy.toml.
+// Elementary functions come from the core: see clippy.toml.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 pub mod codes;

@@ -1,7 +1,7 @@
-//! The `punctual` command line: arguments in, exit code out. The commands are in [`punctual::command`]; nothing
-//! is printed but through [`punctual::output`].
+//! The `punctual` command line: parses arguments and returns the exit code. The commands are in
+//! [`punctual::command`]; all printing goes through [`punctual::output`].
 #![forbid(unsafe_code)]
-// Elementary functions are those of the core: clippy.toml.
+// Elementary functions come from the core: see clippy.toml.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 use std::process::ExitCode;
@@ -61,7 +61,7 @@ enum Command {
     TryPlugin(build::TryPluginArguments),
 }
 
-/// What stdout gets under `--json` where a command fails.
+/// What a failed command prints to stdout with `--json`.
 #[derive(Serialize)]
 struct Failure {
     error: Details,
@@ -77,7 +77,7 @@ fn main() -> ExitCode {
     let program = codes::in_help(Arguments::command());
     let parsed = program.try_get_matches().and_then(|matches| Arguments::from_arg_matches(&matches));
     let arguments = parsed.unwrap_or_else(|error| {
-        // Help and version are no errors.
+        // Help and version are not errors.
         if error.use_stderr() {
             let words = error.render().to_string();
             let message = words.trim_start_matches("error: ").trim_end().to_owned();

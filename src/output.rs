@@ -1,5 +1,5 @@
-//! The one place that prints: results on stdout, talk and progress on stderr. A reader that went away (a closed
-//! pipe) is no error.
+//! The only module that prints: results on stdout, messages and progress on stderr. A reader that went away
+//! (a closed pipe) is not an error.
 
 use std::io::{self, IsTerminal, Write};
 use std::time::{Duration, Instant};
@@ -11,7 +11,7 @@ pub use punctual_pictures::columns::table;
 /// Prints a result: `text` and a line break, on stdout.
 pub fn result(text: &str) {
     let mut out = io::stdout().lock();
-    // Nobody is left to tell of a failure.
+    // There is nobody left to report a failure to.
     let _ = writeln!(out, "{text}").and_then(|()| out.flush());
 }
 
@@ -28,12 +28,13 @@ pub fn note(text: &str) {
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
 
-/// Prints what the user has to know though the command goes on, on stderr.
+/// Prints a warning to the user on stderr; the command goes on.
 pub fn warning(text: &str) {
     note(&format!("{} {text}", console::style("warning:").for_stderr().yellow().bold()));
 }
 
-/// `notes` in the form "name: text", those of one text as one note: "name, name: text". Others stay.
+/// Merges `notes` of the form "name: text" with the same text into one note, "name, name: text". Others are
+/// unchanged.
 pub fn grouped(notes: impl IntoIterator<Item = String>) -> Vec<String> {
     let mut groups: Vec<(Vec<String>, String)> = Vec::new();
     for note in notes {
@@ -56,13 +57,14 @@ pub fn error(error: &dyn std::fmt::Display) {
     note(&format!("{} {error}", console::style("error:").for_stderr().red().bold()));
 }
 
-/// `words`, green where they tell of something `good`, else red. Plain where stdout is no terminal, and under `NO_COLOR`.
+/// `words`, green if the news is `good`, else red. Uncoloured if stdout is not a terminal, and under
+/// `NO_COLOR`.
 pub fn verdict(words: &str, good: bool) -> String {
     let words = console::style(words);
     if good { words.green() } else { words.red() }.to_string()
 }
 
-/// A progress bar on stderr that shows after a second, and only on a terminal.
+/// A progress bar on stderr that appears after a second, and only on a terminal.
 #[derive(Debug)]
 pub struct Progress {
     message: String,
@@ -72,11 +74,11 @@ pub struct Progress {
     wanted: bool,
 }
 
-/// Calls of [`Progress::update`] between two looks at the clock.
+/// Calls of [`Progress::update`] between two checks of the clock.
 const CALLS: u64 = 512;
-/// Time that a run takes before the bar shows.
+/// Time before the bar appears.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// Parts the bar is divided into.
+/// Number of parts of the bar.
 const PARTS: u64 = 1000;
 
 impl Progress {
@@ -86,7 +88,7 @@ impl Progress {
         Self { message: message.into(), begin: Instant::now(), calls: 0, bar: None, wanted }
     }
 
-    /// Says that `fraction` (0 to 1) is done. Cheap enough for every step.
+    /// Reports that `fraction` (0 to 1) is done. Cheap enough for every step.
     pub fn update(&mut self, fraction: f64) {
         self.calls += 1;
         if self.calls.is_multiple_of(CALLS) {
@@ -94,7 +96,7 @@ impl Progress {
         }
     }
 
-    /// Updates the bar at every call, for calls that are far between.
+    /// Updates the bar at every call, for infrequent calls.
     pub fn show(&mut self, fraction: f64) {
         if !self.wanted {
             return;
@@ -102,7 +104,7 @@ impl Progress {
         if self.bar.is_none() && self.begin.elapsed() > PATIENCE {
             let bar =
                 ProgressBar::new(PARTS).with_message(self.message.clone()).with_elapsed(self.begin.elapsed());
-            // The template is a constant; with a broken one the default style stays.
+            // The template is a constant; if it were broken, the default style would remain.
             if let Ok(style) = ProgressStyle::with_template("{msg} {wide_bar} {percent:>3} %  {eta} left") {
                 bar.set_style(style);
             }
@@ -114,16 +116,15 @@ impl Progress {
     }
 }
 
-/// A counter of things done on stderr, with their rate and the time left; on a terminal only. Several threads
-/// may tell it.
+/// A counter on stderr, with the rate and the time left; only on a terminal. Several threads may update it.
 #[derive(Debug)]
 pub struct Counter(ProgressBar);
 
 impl Counter {
-    /// Counts `all` of the things named `what`, `done` of which are done.
+    /// Counts up to `all` of the things named `what`; `done` of them are done already.
     pub fn new(what: &str, done: u64, all: u64) -> Self {
         let bar = ProgressBar::new(all).with_message(what.to_owned());
-        // As above: with a broken template the default style stays.
+        // As above: with a broken template, the default style would remain.
         if let Ok(style) = ProgressStyle::with_template(
             "{human_pos} of {human_len} {msg} {wide_bar} {per_sec}  {elapsed} gone, {eta} left",
         ) {
@@ -134,7 +135,7 @@ impl Counter {
         Self(bar)
     }
 
-    /// Says that `done` are done.
+    /// Reports that `done` are done.
     pub fn update(&self, done: u64) {
         self.0.set_position(done);
     }

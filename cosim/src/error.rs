@@ -1,5 +1,5 @@
-//! The one error type of co-simulation and of all that stands on it. It tells what went wrong, with the names and numbers needed
-//! to mend it, and its exit code.
+//! The one error type of co-simulation and of everything built on it. It says what went wrong, with the names
+//! and numbers needed to fix it, and gives the exit code.
 
 use std::fmt;
 use std::io;
@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::exit;
 use crate::status::{LogMessage, Status};
 
-/// An error that keeps the command from being carried out.
+/// An error that prevents a command from being carried out.
 #[derive(Debug)]
 pub struct Error(Box<Kind>);
 
@@ -58,9 +58,9 @@ pub enum FmuProblem {
         /// The method, such as `bzip2`.
         method: String,
     },
-    /// An entry of this name would be written outside the folder it is unpacked to.
+    /// An entry whose name would place it outside the folder it is unpacked to.
     UnsafeEntry(String),
-    /// It cannot be joined with others to one; with the reason.
+    /// It cannot be merged with others into one; with the reason.
     Unfit(String),
     /// A size beyond the limit for files of unknown origin.
     Limit {
@@ -95,17 +95,17 @@ pub enum FmuProblem {
     },
     /// The shared library cannot be loaded; with the loader's words.
     Load(String),
-    /// It needs what this program does not offer; with the reason.
+    /// It needs something that this program does not offer; with the reason.
     CannotRun(String),
     /// The shared library lacks a function that co-simulation needs.
     MissingSymbol(&'static str),
-    /// A function that tells the version gave something else than the description.
+    /// A function that reports the version contradicts the description.
     Version {
         /// The function asked.
         call: &'static str,
         /// Its answer.
         answer: String,
-        /// The version that the description says.
+        /// The version given in the description.
         wanted: &'static str,
     },
 }
@@ -146,7 +146,7 @@ impl fmt::Display for FmuProblem {
             ),
             Self::Load(reason) => {
                 write!(f, "its library cannot be loaded: {reason}")?;
-                // Those of pythonfmu do: the symbols are Python's own.
+                // Libraries made by pythonfmu do so: the missing symbols are Python's own.
                 let takes_python =
                     ["undefined symbol: Py", "undefined symbol: _Py"].iter().any(|s| reason.contains(s));
                 match takes_python {
@@ -176,9 +176,9 @@ pub struct CallFailure {
     pub path: PathBuf,
     /// The communication point of the call, in seconds; `None` before the experiment is set up.
     pub time: Option<f64>,
-    /// The status that it returned; `None` where it returned a null instance, or what it returned is not at fault.
+    /// The status that it returned; `None` if it returned a null instance, or if the status is not at fault.
     pub status: Option<Status>,
-    /// What was wrong although it succeeded, as the end of a sentence.
+    /// What was wrong although the call succeeded, as the end of a sentence.
     pub fault: Option<String>,
     /// The last log messages of that instance, oldest first.
     pub log: Vec<LogMessage>,
@@ -238,7 +238,7 @@ impl Error {
         Self(Box::new(Kind::Call(failure)))
     }
 
-    /// An FMU that ended its process: `what` it was in, and `how` it ended.
+    /// An FMU that ended its process, `what` it was doing, and `how` it ended.
     pub fn broken(what: impl Into<String>, how: impl Into<String>) -> Self {
         Self(Box::new(Kind::Broken { what: what.into(), how: how.into() }))
     }
@@ -295,7 +295,8 @@ impl Error {
         }
     }
 
-    /// The exit code, one of [`exit`]: whether an FMU is at fault, a configuration or a file, or it was Ctrl-C.
+    /// The exit code, one of [`exit`]. It says whether an FMU, a configuration or a file is at fault, or the
+    /// user pressed Ctrl-C.
     pub fn exit_code(&self) -> u8 {
         match &*self.0 {
             Kind::Fmu { .. } | Kind::Call(_) | Kind::Broken { .. } => exit::FOUND,

@@ -1,6 +1,6 @@
-//! Work with FMUs in a child process. A crash, an `exit()` or a hang of an FMU ends the child, and this process
-//! names the call it was in. The child is this program again. It must leave nothing behind but a journal (see
-//! [`crate::host::journal`]).
+//! Runs work with FMUs in a child process. If an FMU crashes, calls `exit()` or hangs, only the child ends,
+//! and this process reports the call it was in. The child runs this program again. A journal is all that it
+//! leaves behind (see [`crate::host::journal`]).
 
 use std::ffi::OsString;
 use std::fmt;
@@ -17,15 +17,15 @@ use crate::host::journal::{self, LastCall};
 
 /// The name of the journal in the child's folder.
 const JOURNAL: &str = "journal";
-/// Period at which the child is looked at while it runs.
+/// Interval at which the running child is polled.
 const LOOK: Duration = Duration::from_millis(5);
 
 fn journal_file(folder: &Path) -> PathBuf {
     folder.join(JOURNAL)
 }
 
-/// Begins, in the child, the journal in the folder that the watching process made, and unpacks FMUs below it. So
-/// nothing is left behind when this process has no time to tidy up.
+/// Prepares the child: starts the journal in the folder that the watching process made, and unpacks FMUs
+/// below that folder. So nothing is left behind if this process has no time to clean up.
 ///
 /// # Errors
 ///
@@ -34,46 +34,46 @@ pub fn settle(folder: &Path) -> Result<(), Error> {
     crash_at_once();
     let file = journal_file(folder);
     journal::begin(&file).map_err(|e| Error::io("write", &file, e))?;
-    // A refusal means that it is set already: then files go there.
+    // An error means that a folder was set before; files then go there.
     let _ = tempfile::env::override_temp_dir(folder);
     Ok(())
 }
 
-/// Output that the child may print.
+/// What happens to the output of the child.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Voice {
-    /// Its output is this process's.
+    /// It goes to the output of this process.
     Loud,
-    /// Its output is dropped.
+    /// It is dropped.
     Silent,
 }
 
-/// The end of a child.
+/// How a child ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum End {
     /// By itself, after it had finished with its FMUs; with its exit code.
     Finished(i32),
-    /// In the middle of its work with an FMU.
+    /// While it was still working with an FMU.
     Broken {
-        /// The way it broke off.
+        /// How it broke off.
         how: Break,
         /// The last call made; `None` before the first.
         last: Option<LastCall>,
     },
 }
 
-/// Ways in which a child breaks off.
+/// Ways in which a child can break off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Break {
-    /// Ended by this signal.
+    /// Terminated by this signal.
     Signal(i32),
-    /// Ended by this exception, on Windows.
+    /// Terminated by this exception, on Windows.
     Exception(u32),
-    /// Ended with this exit code, which the FMU chose by ending the process.
+    /// Exited with this code, because the FMU ended the process.
     Exit(i32),
-    /// Stopped because it took too long.
+    /// Killed because it took too long.
     Late {
-        /// The time it had.
+        /// The time limit.
         limit: Duration,
         /// How long its last call had lasted.
         call: Duration,
@@ -91,7 +91,7 @@ impl fmt::Display for Break {
     }
 }
 
-/// The name of a signal that ends a process by itself, if all systems agree on its number.
+/// The meaning of a signal that terminates a process, if its number is the same on all systems.
 fn meaning(signal: i32) -> &'static str {
     match signal {
         4 => " (illegal instruction)",
@@ -104,7 +104,7 @@ fn meaning(signal: i32) -> &'static str {
     }
 }
 
-/// The meaning of an exception of Windows that is not handled.
+/// The meaning of an unhandled exception of Windows.
 fn cause(exception: u32) -> &'static str {
     match exception {
         0xC000_0005 => " (invalid memory access)",
@@ -118,15 +118,15 @@ fn cause(exception: u32) -> &'static str {
     }
 }
 
-/// The way in which a process with the exit code `code` broke off on Windows, which has no signals: an exception that is not
-/// handled becomes the exit code; those of the system begin with 0xC.
+/// How a process with the exit code `code` broke off on Windows, which has no signals. An unhandled exception
+/// becomes the exit code; those of the system begin with 0xC.
 #[cfg(any(not(unix), test))]
 fn coded(code: i32) -> Break {
     let number = code.cast_unsigned();
     if number >> 28 == 0xC { Break::Exception(number) } else { Break::Exit(code) }
 }
 
-/// A folder for a child and its arguments.
+/// The folder of a child process.
 #[derive(Debug)]
 pub struct Child {
     folder: TempDir,
@@ -149,7 +149,7 @@ impl Child {
         self.folder.path()
     }
 
-    /// Runs this program with `arguments` and waits for its end, at most `limit`.
+    /// Runs this program with `arguments` and waits until it ends, at most for `limit`.
     ///
     /// # Errors
     ///
@@ -168,7 +168,7 @@ impl Child {
             command.stdout(Stdio::null()).stderr(Stdio::null());
         }
         let begin = Instant::now();
-        // The record of the last call, and when it was first seen.
+        // The last record of the journal, and when it first appeared.
         let (mut record, mut entered) = (Vec::new(), begin);
         let mut child = command.spawn().map_err(failed)?;
         let status = loop {
@@ -183,7 +183,7 @@ impl Child {
             }
             if let Some(limit) = limit.filter(|limit| begin.elapsed() >= *limit) {
                 let call = entered.elapsed();
-                // The child may just have ended by itself; either way it is waited for.
+                // The child may have ended by itself just now; it is waited for in any case.
                 let _ = child.kill();
                 child.wait().map_err(failed)?;
                 return Ok(End::Broken { how: Break::Late { limit, call }, last: self.last_call() });

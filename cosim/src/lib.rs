@@ -1,5 +1,5 @@
-//! Co-simulation: a host for FMUs of FMI 2.0 and 3.0, the master that couples them, campaigns of many runs, and the
-//! packager and checker of FMUs. Draws and prints nothing.
+//! Co-simulation: a host for FMUs of FMI 2.0 and 3.0, the master that couples them, campaigns of many runs,
+//! and a packager and checker of FMUs. This crate draws and prints nothing.
 //!
 //! Each module uses only modules above it:
 //!
@@ -7,7 +7,7 @@
 //! exit                 the exit codes of processes that use it
 //! status               the status of an FMI call, and log messages
 //! error                the errors of everything here, with names and numbers
-//! text                 files of text, and what is said of others in their place
+//! text                 text files, and other files given in their place
 //! host                 one FMU: archive, description, library, instance
 //! whole                files that are written whole or not at all
 //! isolation            FMUs in a child process, which may crash
@@ -18,7 +18,7 @@
 //! campaign             many runs from drawn starts and parameters, in process; Parquet
 //! ```
 #![deny(unsafe_code)]
-// Elementary functions are those of the core: clippy.toml.
+// Elementary functions come from the core: see clippy.toml.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 pub mod campaign;

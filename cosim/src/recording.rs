@@ -11,7 +11,7 @@ use crate::whole;
 pub struct Column {
     /// `component.variable`.
     pub name: String,
-    /// Its unit, such as `m/s`; `None` where it has none.
+    /// Its unit, such as `m/s`, if it has one.
     pub unit: Option<String>,
 }
 
@@ -30,8 +30,8 @@ impl Recording {
         Self { columns, times: Vec::new(), values: Vec::new() }
     }
 
-    /// Adds a row at `time` (s). `row` holds one value for each column, in order; further ones are
-    /// dropped and missing ones become NaN.
+    /// Adds a row at `time` (s). `row` holds one value for each column, in order; extra values are dropped
+    /// and missing ones become NaN.
     pub fn push(&mut self, time: f64, row: &[f64]) {
         self.times.push(time);
         let n = self.columns.len();
@@ -45,7 +45,7 @@ impl Recording {
         self.values.reserve(rows.saturating_mul(self.columns.len()));
     }
 
-    /// The columns, time not among them.
+    /// The columns, without the time.
     pub fn columns(&self) -> &[Column] {
         &self.columns
     }
@@ -60,12 +60,12 @@ impl Recording {
         self.times.is_empty()
     }
 
-    /// The times of the rows, in seconds, rising.
+    /// The times of the rows, in seconds, increasing.
     pub fn times(&self) -> &[f64] {
         &self.times
     }
 
-    /// The row at `index`; empty where there is none.
+    /// The row at `index`; empty if there is none.
     pub fn row(&self, index: usize) -> &[f64] {
         let n = self.columns.len();
         if index < self.len() { &self.values[index * n..(index + 1) * n] } else { &[] }
@@ -81,19 +81,19 @@ impl Recording {
         self.index_of(name).map(|column| self.column(column).collect())
     }
 
-    /// The values of the column at `index`, one for each row; none where there is no such column.
+    /// The values of the column at `index`, one for each row; empty if there is no such column.
     pub fn column(&self, index: usize) -> impl Iterator<Item = f64> + '_ {
         let n = self.columns.len();
         let start = if index < n { index } else { self.values.len() };
         self.values[start.min(self.values.len())..].iter().copied().step_by(n.max(1))
     }
 
-    /// Writes the table as CSV: a header of `time` and the column names, with `units` a line of these, then rows of numbers
-    /// that read back to the same doubles.
+    /// Writes the table as CSV: a header with `time` and the column names, a line of units if `units`, then
+    /// rows of numbers that read back as the same doubles.
     ///
     /// # Errors
     ///
-    /// As the writer's.
+    /// Those of the writer.
     pub fn write_csv(&self, mut out: impl Write, units: bool) -> io::Result<()> {
         write_header(&mut out, &self.columns, units)?;
         for (index, time) in self.times.iter().enumerate() {
@@ -112,11 +112,12 @@ impl Recording {
     }
 }
 
-/// Writes the first line of the CSV form, and with `units` the second, where a column without one has an empty field.
+/// Writes the header line of the CSV form, and with `units` a second line, in which a column without a unit
+/// has an empty field.
 ///
 /// # Errors
 ///
-/// As the writer's.
+/// Those of the writer.
 pub fn write_header(out: &mut impl Write, columns: &[Column], units: bool) -> io::Result<()> {
     write!(out, "time")?;
     for column in columns {
@@ -137,7 +138,7 @@ pub fn write_header(out: &mut impl Write, columns: &[Column], units: bool) -> io
 ///
 /// # Errors
 ///
-/// As the writer's.
+/// Those of the writer.
 pub fn write_row(out: &mut impl Write, time: f64, row: &[f64]) -> io::Result<()> {
     write_number(out, time)?;
     for value in row {
@@ -147,7 +148,7 @@ pub fn write_row(out: &mut impl Write, time: f64, row: &[f64]) -> io::Result<()>
     writeln!(out)
 }
 
-/// The shortest text that reads back to `value`; powers of ten where they are shorter.
+/// The shortest text that reads back as `value`, in exponent notation if that is shorter.
 fn write_number(out: &mut impl Write, value: f64) -> io::Result<()> {
     let size = value.abs();
     if size != 0.0 && !(1e-5..1e16).contains(&size) && value.is_finite() {
@@ -157,7 +158,7 @@ fn write_number(out: &mut impl Write, value: f64) -> io::Result<()> {
     }
 }
 
-/// A CSV field, in quotes where it needs them.
+/// A CSV field, quoted if necessary.
 pub fn quoted(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", text.replace('"', "\"\""))

@@ -1,4 +1,4 @@
-//! The status of a call or a message, in the words of its version of FMI; and messages.
+//! The status of a call or a message, in the terms of its version of FMI; and messages.
 
 use std::fmt;
 
@@ -14,28 +14,28 @@ pub enum Status {
 }
 
 impl Status {
-    /// Whether the call did all that was asked.
+    /// Whether the call did everything that was asked.
     #[inline]
     pub fn is_ok(self) -> bool {
         matches!(self, Self::Fmi2(fmi2::Status::OK) | Self::Fmi3(fmi3::Status::OK))
     }
 
-    /// Whether the call was done, with a remark in the log.
+    /// Whether the call succeeded with a remark in the log.
     pub fn is_warning(self) -> bool {
         matches!(self, Self::Fmi2(fmi2::Status::WARNING) | Self::Fmi3(fmi3::Status::WARNING))
     }
 
-    /// Whether the call was refused and the instance is as before.
+    /// Whether the call was refused and the instance is unchanged.
     pub fn is_discard(self) -> bool {
         matches!(self, Self::Fmi2(fmi2::Status::DISCARD) | Self::Fmi3(fmi3::Status::DISCARD))
     }
 
-    /// Whether the call goes on in the background, which only FMI 2.0 knows.
+    /// Whether the call continues in the background, which only FMI 2.0 has.
     pub fn is_pending(self) -> bool {
         self == Self::Fmi2(fmi2::Status::PENDING)
     }
 
-    /// Whether the standard knows this number.
+    /// Whether the standard defines this number.
     pub fn is_known(self) -> bool {
         match self {
             Self::Fmi2(status) => status.is_known(),
@@ -43,7 +43,7 @@ impl Status {
         }
     }
 
-    /// Whether the standard forbids to free the instance after it, or does not know it.
+    /// Whether the standard forbids freeing the instance after this status, or does not define it.
     pub fn is_last(self) -> bool {
         match self {
             _ if !self.is_known() => true,
@@ -74,14 +74,14 @@ impl From<fmi3::Status> for Status {
     }
 }
 
-/// One message of an FMU.
+/// A log message of an FMU.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LogMessage {
     /// The status the FMU gave with it.
     pub status: Status,
-    /// The log category, empty where the FMU gave none.
+    /// The log category; empty if the FMU gave none.
     pub category: String,
-    /// The finished text, at most 2047 bytes of it.
+    /// The formatted text, at most 2047 bytes of it.
     pub text: String,
 }
 

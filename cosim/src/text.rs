@@ -1,11 +1,11 @@
-//! Files of text, and what is said of other files in their place.
+//! Reads text files, and recognises other files that were given in their place.
 
 use std::io;
 use std::path::Path;
 
 use crate::error::Error;
 
-/// How files begin that are no text, or are in another encoding; and what is said of them.
+/// How other kinds of files and encodings begin, and what to call them.
 const OTHERS: [(&[u8], &str); 4] = [
     (
         b"PK\x03\x04",
@@ -25,7 +25,7 @@ pub fn is_toml(path: &Path) -> bool {
 ///
 /// # Errors
 ///
-/// A file that cannot be read, a folder, or a file that is no text in UTF-8: with what it is.
+/// A file that cannot be read, a folder, or a file that is no UTF-8 text; the message says what it is.
 pub fn read(path: &Path) -> Result<String, Error> {
     let refuse = |message: String| Error::io("read", path, io::Error::other(message));
     if path.is_dir() {

@@ -1,4 +1,4 @@
-//! Files that are written whole or not at all: a full disk or a crash leaves what was there before.
+//! Writes files completely or not at all: after a full disk or a crash, the previous file is still there.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -10,12 +10,12 @@ use crate::error::Error;
 ///
 /// # Errors
 ///
-/// A file that cannot be written; the one that was there stays as it was.
+/// A file that cannot be written; the previous one is unchanged.
 pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), Error> {
     write_with(path, |out| out.write_all(bytes.as_ref()))
 }
 
-/// Writes what `content` writes to the file at `path`.
+/// Writes the output of `content` to the file at `path`.
 ///
 /// # Errors
 ///
@@ -25,7 +25,7 @@ pub fn write_with(
     content: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<(), Error> {
     let failed = |e| Error::io("write", path, e);
-    // A pipe or a device is written to, and not replaced.
+    // A pipe or a device is written to directly, not replaced.
     let is_file = fs::metadata(path).map_or(true, |meta| meta.is_file());
     let place = if is_file { draft(path) } else { path.to_owned() };
     let written = File::create(&place).and_then(|file| {
@@ -36,14 +36,14 @@ pub fn write_with(
     let done = written.and_then(|()| if is_file { fs::rename(&place, path) } else { Ok(()) });
     done.map_err(|e| {
         if is_file {
-            // If this fails too, the first error is the one to tell.
+            // If this fails too, the first error is the one to report.
             let _ = fs::remove_file(&place);
         }
         failed(e)
     })
 }
 
-/// The name of a file at `path` until it is whole.
+/// The temporary name of the file at `path` until it is complete.
 fn draft(path: &Path) -> PathBuf {
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(".part");

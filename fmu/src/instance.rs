@@ -1,17 +1,17 @@
 //! The state machine of FMI 2.0 and 3.0 in safe Rust: modes, time, values, lazy outputs.
 //!
-//! Everything here takes references and returns `Result`; the C interface is only guard and conversion.
-//! A failed call leaves the instance as it was.
+//! Everything here takes references and returns `Result`; the C interface only guards and converts. A failed
+//! call leaves the instance unchanged.
 //!
-//! **Sample time.** An output read after inputs were set belongs to those inputs at the communication point at
-//! which they were set. It is computed when read, and only looked at. A step computes the sample at its start and
-//! remembers it. After the step, outputs stay that sample (a filter) or show the new state (a plant) until inputs
-//! change.
+//! **Sample time.** An output read after inputs were set belongs to those inputs at the communication point
+//! at which they were set. It is computed when read, and changes no state. A step computes the sample at its
+//! start and remembers it. After the step, outputs stay at that sample (a filter) or show the new state (a
+//! plant) until inputs change.
 //!
-//! **Steps taken back.** Importers that restore a state may forget to turn their own clock back (MasterSim does). So the
-//! first step after a restore may be given any time within the steps that it took back, and starts at the
-//! restored one. How far these went is known to the instance and is no part of a snapshot: a restored state has the
-//! bytes that it had, and with right times it decides nothing.
+//! **Steps taken back.** Importers that restore a state may forget to reset their own clock (MasterSim does).
+//! So the first step after a restore may be given any time within the steps that were taken back, and starts
+//! at the restored time. The instance knows the extent of these steps, but it is not part of a snapshot: a
+//! restored state has the same bytes as before, and with correct times the extent has no effect.
 
 mod access;
 mod arrays;
@@ -25,16 +25,17 @@ use crate::configuration::{Configuration, ConfigurationError, FmiVersion};
 use crate::product::{Access, Product};
 pub use places::Place;
 
-/// Times in s that differ by no more than this and [`TIME_ROUND_OFF`] are the same communication point:
+/// Times in s that differ by at most this plus [`TIME_ROUND_OFF`] are the same communication point, since
 /// importers count time in nanoseconds.
 const SAME_TIME: f64 = 1e-9;
 
-/// Part of a time that is round-off, some hundred units in the last place: importers accumulate time
-/// by addition or multiply it out. Much less than any step, also where time is counted from 1970.
+/// Fraction of a time that counts as round-off, some hundred units in the last place, since importers
+/// accumulate time by addition or multiplication. It is much less than any step, even if time is counted from
+/// 1970.
 const TIME_ROUND_OFF: f64 = 1e-13;
 
-/// Part of the last step by which a plant's next step may start later, for importers that round times to their
-/// own resolution.
+/// Fraction of the last step by which a plant's next step may start late, for importers that round times to
+/// their own resolution.
 const GAP: f64 = 1e-3;
 
 /// The modes of an instance, as flags.
@@ -57,10 +58,10 @@ impl Mode {
         Self(self.0 | other.0)
     }
 
-    /// Each mode by itself.
+    /// Each mode separately.
     pub const EACH: [Self; 4] = [Self::INSTANTIATED, Self::INITIALIZATION, Self::STEP, Self::TERMINATED];
 
-    /// Whether `self` is among `modes`.
+    /// Whether `self` is one of `modes`.
     pub fn is_in(self, modes: Self) -> bool {
         self.0 & modes.0 != 0
     }
@@ -77,35 +78,35 @@ impl Mode {
     }
 }
 
-/// The calls whose legality depends on the mode. Those of FMI 3.0 have the same names but for the prefix.
+/// The calls whose legality depends on the mode. In FMI 3.0 their names differ only in the prefix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Call {
     /// `fmi2SetupExperiment`.
     SetupExperiment,
-    /// `fmi2EnterInitializationMode`; `fmi2SetupExperiment` before it is not insisted on.
+    /// `fmi2EnterInitializationMode`; a preceding `fmi2SetupExperiment` is not required.
     EnterInitializationMode,
     /// `fmi2ExitInitializationMode`.
     ExitInitializationMode,
     /// `fmi2Terminate`.
     Terminate,
-    /// `fmi2GetReal` and its like.
+    /// `fmi2GetReal` and the other getters.
     Get,
-    /// `fmi2SetReal` and its like.
+    /// `fmi2SetReal` and the other setters.
     Set,
     /// `fmi2DoStep`.
     DoStep,
-    /// `fmi2GetDirectionalDerivative`; `fmi3GetAdjointDerivative` too.
+    /// `fmi2GetDirectionalDerivative`; also `fmi3GetAdjointDerivative`.
     GetDirectionalDerivative,
 }
 
-/// The modes in which each call is legal, in the order of [`Call`] (FMI 2.0.4, section 4.2.4, figure 11; FMI 3.0.2, sections
-/// 2.3.2 to 2.3.8 and 4.2.1). They are wider than the standards where importers are: values may be read in every mode. Calls
-/// that are not here are legal in every mode.
+/// The modes in which each call is legal, in the order of [`Call`] (FMI 2.0.4, section 4.2.4, figure 11; FMI
+/// 3.0.2, sections 2.3.2 to 2.3.8 and 4.2.1). They are wider than the standards where importers are: values
+/// may be read in every mode. Calls that are not listed are legal in every mode.
 pub const LEGAL: [(Call, Mode); 8] = {
     const SETTABLE: Mode = Mode::INSTANTIATED.or(Mode::INITIALIZATION).or(Mode::STEP);
     const KNOWN: Mode = Mode::INITIALIZATION.or(Mode::STEP).or(Mode::TERMINATED);
     [
-        // FMI 3.0 has no such function, but in process there is one for both.
+        // FMI 3.0 has no such function, but in-process instances use it for both versions.
         (Call::SetupExperiment, Mode::INSTANTIATED),
         (Call::EnterInitializationMode, Mode::INSTANTIATED),
         (Call::ExitInitializationMode, Mode::INITIALIZATION),
@@ -118,7 +119,7 @@ pub const LEGAL: [(Call, Mode); 8] = {
 };
 
 impl Call {
-    /// The modes in which it is legal, by [`LEGAL`].
+    /// The modes in which it is legal, from [`LEGAL`].
     #[inline]
     pub fn modes(self) -> Mode {
         let (_, modes) = LEGAL[self as usize];
@@ -126,19 +127,19 @@ impl Call {
     }
 }
 
-/// Steps that followed each other without a gap, times in s.
+/// A series of steps without gaps, times in s.
 #[derive(Clone, Copy, Debug)]
 struct Unbroken {
     begin: f64,
-    /// The present communication point, or a later one between a restore and the next step: where the steps ended that
-    /// were taken back.
+    /// The current communication point. Between a restore and the next step, it may be later: the end of the
+    /// steps that were taken back.
     end: f64,
-    /// The most by which a step began after the end of the one before, as those of a clock that rounds do.
+    /// The largest delay of a step after the end of the one before, as occurs with a clock that rounds.
     rounding: f64,
 }
 
 impl Unbroken {
-    /// No step, at `time`.
+    /// A series without steps, at `time`.
     fn at(time: f64) -> Self {
         Self { begin: time, end: time, rounding: 0.0 }
     }
@@ -149,16 +150,16 @@ impl Unbroken {
 enum Mistimed {
     /// Not in this run.
     Never,
-    /// For the first time, `given` in place of `restored`, in s.
+    /// For the first time: `given` instead of `restored`, in s.
     First { given: f64, restored: f64 },
-    /// As was reported.
+    /// Already reported.
     Reported,
 }
 
 /// The reason why a call failed, for the log: the value given and those allowed.
 pub type Failure = String;
 
-/// A snapshot of an instance: all that influences what it does later.
+/// A snapshot of an instance: everything that influences its future.
 #[derive(Debug, PartialEq)]
 pub struct State {
     /// The GUID of the FMU it belongs to.
@@ -167,7 +168,8 @@ pub struct State {
     pub mode: Mode,
     /// The communication point in s.
     pub time: f64,
-    /// The end of the run in s, past which FMI 3.0 allows no step; infinite where none was given, and with FMI 2.0.
+    /// The end of the run in s, beyond which FMI 3.0 allows no step; infinite if none was given, and with FMI
+    /// 2.0.
     pub stop: f64,
     /// Whether a step was made since initialization.
     pub stepped: bool,
@@ -177,7 +179,7 @@ pub struct State {
     pub fresh: bool,
     /// Whether `block` belongs to the parameters in `values`.
     pub configured: bool,
-    /// Inputs (pending ones too), outputs and parameters.
+    /// Inputs (including pending ones), outputs and parameters.
     pub values: Values,
     /// The state of the computation.
     pub block: BlockState,
@@ -186,19 +188,19 @@ pub struct State {
 /// One instance of an FMU, of either version of FMI.
 pub struct Instance {
     product: Product,
-    /// The version of FMI in `product`: every call asks for it.
+    /// The version of FMI in `product`, which every call checks.
     fmi: FmiVersion,
-    /// Type and causality by value reference: checked at every read and write, in few bytes.
+    /// Type and causality by value reference; compact, since it is checked at every read and write.
     kinds: Vec<(BaseType, Causality, Variability)>,
     /// The same for FMI 3.0, with the lengths of arrays; empty for FMI 2.0.
     accesses: Vec<Access>,
     block: Box<dyn Block>,
-    /// The state of a new block, which remembers nothing yet.
+    /// The state of a new block, which has no memory yet.
     start: BlockState,
     mode: Mode,
-    /// The present communication point in s.
+    /// The current communication point in s.
     time: f64,
-    /// The end of the run in s, if a step past it is an error.
+    /// The end of the run in s, if a step beyond it is an error.
     stop: f64,
     values: Values,
     /// Whether a step was made since initialization.
@@ -211,13 +213,13 @@ pub struct Instance {
     configured: bool,
     unbroken: Unbroken,
     mistimed: Mistimed,
-    /// Scratch: a direction and the derivative along it, at the indices of the variables; and what an adjoint
-    /// derivative has gathered.
+    /// Buffers: a direction and the derivative along it, at the indices of the variables; and the sum for an
+    /// adjoint derivative.
     derivative: [Vec<f64>; 3],
 }
 
 impl Instance {
-    /// An instance of `configuration`, which must be the one that `guid` was made for.
+    /// An instance of `configuration`, which must be the one that `guid` belongs to.
     ///
     /// # Errors
     ///
@@ -264,12 +266,12 @@ impl Instance {
         Ok(instance)
     }
 
-    /// The present mode.
+    /// The current mode.
     pub fn mode(&self) -> Mode {
         self.mode
     }
 
-    /// The present communication point in s.
+    /// The current communication point in s.
     pub fn time(&self) -> f64 {
         self.time
     }
@@ -279,12 +281,12 @@ impl Instance {
         &self.product
     }
 
-    /// The version of FMI that it is an instance of.
+    /// Its version of FMI.
     pub fn fmi(&self) -> FmiVersion {
         self.fmi
     }
 
-    /// Whether it is past its initialization, so that fixed parameters stay as they are.
+    /// Whether initialization is over, so that fixed parameters cannot change.
     fn is_running(&self) -> bool {
         self.mode == Mode::STEP
     }
@@ -300,7 +302,7 @@ impl Instance {
         if self.mode.is_in(modes) { Ok(()) } else { Err(self.misplaced(modes)) }
     }
 
-    /// The reason why a call is refused that is legal in `modes` alone.
+    /// The reason for refusing a call that is only legal in `modes`.
     #[cold]
     fn misplaced(&self, modes: Mode) -> Failure {
         let allowed: Vec<_> = Mode::EACH
@@ -311,7 +313,7 @@ impl Instance {
         format!("not allowed in the mode {:?}, only in {}", self.mode.name(), allowed.join(", "))
     }
 
-    /// Takes the start time; tolerance and stop time are not needed.
+    /// Sets the start time; tolerance and stop time are not used.
     ///
     /// # Errors
     ///
@@ -323,11 +325,12 @@ impl Instance {
         Ok(())
     }
 
-    /// Goes to initialization mode as FMI 3.0 does: with the start time, and the stop time past which no step may go.
+    /// Enters initialization mode as in FMI 3.0: with the start time, and the stop time beyond which no step
+    /// may go.
     ///
     /// # Errors
     ///
-    /// As of [`Self::setup_experiment`].
+    /// Those of [`Self::setup_experiment`].
     pub fn begin(&mut self, start_time: f64, stop_time: Option<f64>) -> Result<(), Failure> {
         self.check(Call::EnterInitializationMode)?;
         Self::check_times(start_time, stop_time)?;
@@ -345,7 +348,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Goes to initialization mode.
+    /// Enters initialization mode.
     ///
     /// # Errors
     ///
@@ -357,7 +360,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Takes the parameters over and goes to step mode.
+    /// Applies the parameters and enters step mode.
     ///
     /// # Errors
     ///
@@ -383,7 +386,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Goes back to the state after `fmi2Instantiate`, start values included.
+    /// Returns to the state after `fmi2Instantiate`, start values included.
     pub fn reset(&mut self) {
         self.mode = Mode::INSTANTIATED;
         (self.time, self.stop) = (0.0, f64::INFINITY);
@@ -395,7 +398,7 @@ impl Instance {
         let len = self.product.variables.len();
         self.values = Values::zeros(len);
         self.start_values();
-        // Restoring makes a state taken now that of a new instance, bit for bit.
+        // After this, a state saved now equals that of a new instance, bit for bit.
         let restored = self.block.restore(&self.start);
         debug_assert!(restored.is_ok(), "{restored:?}");
     }
@@ -420,7 +423,8 @@ impl Instance {
 
     /// Overwrites `state` with a snapshot; does not allocate if that was one of this FMU.
     pub fn save(&self, state: &mut State) {
-        // Without `..`: a new field does not compile here until it is decided whether it belongs to the state.
+        // Without `..`, so that a new field does not compile until it is decided whether it belongs to the
+        // state.
         let Self {
             product,
             fmi: _,
@@ -447,8 +451,8 @@ impl Instance {
         block.save(&mut state.block);
     }
 
-    /// Restores a snapshot of this or another instance of the same FMU, an earlier or a later one, in any mode:
-    /// every bit that follows is the same. Allocates only where the parameters were others.
+    /// Restores an earlier or later snapshot of this or another instance of the same FMU, in any mode.
+    /// Everything that follows is bitwise the same. Only allocates if the parameters differ.
     ///
     /// # Errors
     ///
@@ -477,15 +481,16 @@ impl Instance {
         Ok(())
     }
 
-    /// Makes the communication step from `t` by `h` seconds. The first one after a restore is made from the restored
-    /// time wherever `t` lies within the steps that were taken back; [`Self::notice`] tells it.
+    /// Makes the communication step from `t` by `h` seconds. The first one after a restore starts at the
+    /// restored time wherever `t` lies within the steps that were taken back; [`Self::notice`] reports this.
     ///
     /// # Errors
     ///
-    /// The wrong mode; a step that is not finite or negative; a time that is not finite or lies before the
-    /// present communication point; for a plant also one after it (a part of its motion would be missing); a
-    /// refusal by the block itself. Importers that ignore the error see it in the outputs of a filter: `status`
-    /// is `invalid_input` and `u` nearest 0 until an input is set or a step made.
+    /// The wrong mode; a step size that is not finite or negative; a time that is not finite or before the
+    /// current communication point, or for a plant also after it (part of its motion would be missing); a
+    /// refusal by the block itself. Importers that ignore the error see it in the outputs of a filter:
+    /// `status` is `invalid_input` and `u` is as close to 0 as its bounds allow, until an input is set or a
+    /// step is made.
     #[inline]
     pub fn do_step(&mut self, t: f64, h: f64) -> Result<(), Failure> {
         self.check(Call::DoStep)?;
@@ -500,12 +505,12 @@ impl Instance {
         reason
     }
 
-    /// What the user has to know of the configuration, if there is anything.
+    /// A warning on the configuration, if there is one.
     pub fn warning(&self) -> Option<String> {
         self.product.configuration.warning()
     }
 
-    /// What the user should know of the last step, if there is anything; said once.
+    /// A notice to the user on the last step, if there is one; given once.
     #[inline]
     pub fn notice(&mut self) -> Option<String> {
         match self.mistimed {
@@ -525,7 +530,7 @@ impl Instance {
 
     fn step(&mut self, t: f64, h: f64) -> Result<(), Failure> {
         let (end, same) = (t + h, SAME_TIME + TIME_ROUND_OFF * t.abs());
-        // An end that is finite has a finite time and step.
+        // If the end is finite, so are the time and the step size.
         if t < self.time - same || end > self.stop + same || !(h >= 0.0 && end.is_finite()) {
             return Err(self.out_of_time(t, h, same));
         }
@@ -536,7 +541,7 @@ impl Instance {
         }
     }
 
-    /// The reason why no step is made from `t` by `h` seconds.
+    /// The reason for refusing a step from `t` by `h` seconds.
     #[cold]
     fn out_of_time(&self, t: f64, h: f64, same: f64) -> Failure {
         let (time, end) = (self.time, t + h);
@@ -551,7 +556,7 @@ impl Instance {
         }
     }
 
-    /// Makes the step from `t`, which is more than `same` after the present time.
+    /// Makes the step from `t`, which is more than `same` after the current time.
     #[cold]
     fn step_after_gap(&mut self, t: f64, h: f64, same: f64) -> Result<(), Failure> {
         let (start, mistimed, unbroken) = self.after_gap(t, same)?;
@@ -575,11 +580,12 @@ impl Instance {
         Ok(())
     }
 
-    /// Where a step begins that is given the time `t`, more than `same` after the present one; whether that is a wrong time
-    /// after a restore; and the unbroken steps before it.
+    /// For a step given the time `t`, more than `same` after the current one: where it begins, whether that
+    /// is a wrong time after a restore, and the unbroken steps before it.
     fn after_gap(&self, t: f64, same: f64) -> Result<(f64, bool, Unbroken), Failure> {
         let (gap, rounding, unbroken) = (t - self.time, GAP * self.last_step, self.unbroken);
-        // A clock that rounds does so as before when it goes back; all else within what was taken back is a wrong time.
+        // A clock that rounds repeats its rounding when it goes back. Any other time within the steps taken
+        // back is wrong.
         let is_taken_back = unbroken.end > self.time && t <= unbroken.end + same;
         if is_taken_back && gap > rounding.min(unbroken.rounding) {
             return Ok((self.time, true, unbroken));
@@ -600,7 +606,7 @@ impl Instance {
     ///
     /// # Errors
     ///
-    /// A value reference that is not one of a real.
+    /// A value reference that is not that of a real.
     pub fn get_real(&mut self, references: &[u32], out: &mut [f64]) -> Result<(), Failure> {
         self.get(BaseType::Real, references, out, |values| &values.reals)
     }
@@ -609,7 +615,7 @@ impl Instance {
     ///
     /// # Errors
     ///
-    /// A value reference that is not one of an integer or enumeration.
+    /// A value reference that is not that of an integer or enumeration.
     pub fn get_integer(&mut self, references: &[u32], out: &mut [i32]) -> Result<(), Failure> {
         self.get(BaseType::Integer, references, out, |values| &values.integers)
     }
@@ -618,7 +624,7 @@ impl Instance {
     ///
     /// # Errors
     ///
-    /// A value reference that is not one of a boolean.
+    /// A value reference that is not that of a boolean.
     pub fn get_boolean(&mut self, references: &[u32], out: &mut [i32]) -> Result<(), Failure> {
         self.check_references(Call::Get, BaseType::Boolean, references)?;
         self.refresh();
@@ -637,13 +643,13 @@ impl Instance {
         self.check_references(call, BaseType::String, references)
     }
 
-    /// Writes reals. Inputs may have any value; one that is not finite shows in `status`, or in the next step of
-    /// a plant. Parameters must lie within their range.
+    /// Writes reals. Inputs may have any value; one that is not finite shows in `status`, or at the next step
+    /// of a plant. Parameters must lie within their range.
     ///
     /// # Errors
     ///
-    /// The wrong mode; a reference that is not one of a real input or parameter; a parameter outside
-    /// its range or after initialization.
+    /// The wrong mode; a reference that is not that of a real input or parameter; a parameter outside its
+    /// range or after initialization.
     pub fn set_real(&mut self, references: &[u32], values: &[f64]) -> Result<(), Failure> {
         self.check_settable(BaseType::Real, references)?;
         for (&reference, &value) in references.iter().zip(values) {
@@ -656,8 +662,8 @@ impl Instance {
         Ok(())
     }
 
-    /// Checks that the real number `index` may have the `value`: a parameter within its range, and an input, which comes
-    /// before the outputs, any.
+    /// Checks that the real number `index` may have this `value`. A parameter must lie within its range; an
+    /// input, which comes before the outputs, may have any value.
     #[inline]
     fn check_range(&self, index: usize, value: f64) -> Result<(), Failure> {
         match index.checked_sub(self.product.layout.parameters) {
@@ -676,7 +682,8 @@ impl Instance {
         self.fresh &= references.is_empty();
         let tuned = references.iter().any(|&reference| reference as usize >= self.product.layout.parameters);
         if tuned && self.is_running() {
-            // The block reads from the values what may change in a run. It matters at once.
+            // The block reads from the values what may change during a run, so a change takes effect
+            // immediately.
             self.block.output(self.time, &mut self.values);
         } else if tuned {
             self.configured = false;
@@ -700,7 +707,7 @@ impl Instance {
     ///
     /// # Errors
     ///
-    /// The wrong mode; a reference that is not one of a boolean input.
+    /// The wrong mode; a reference that is not that of a boolean input.
     pub fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Result<(), Failure> {
         self.check_settable(BaseType::Boolean, references)?;
         for (&reference, &value) in references.iter().zip(values) {
@@ -725,7 +732,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Computes the outputs if inputs changed since the last time.
+    /// Computes the outputs if inputs have changed since the last time.
     #[inline]
     fn refresh(&mut self) {
         if !self.fresh {
@@ -740,8 +747,8 @@ impl Instance {
             Mode::STEP => self.block.direct_feedthrough(),
             _ => false,
         };
-        // Contradicting parameters are an error when initialization ends. Until then the outputs stay as they
-        // are.
+        // Contradictory parameters are an error when initialization ends. Until then, the outputs stay as
+        // they are.
         if lazy && (self.configured || self.configure().is_ok()) {
             self.block.output(self.time, &mut self.values);
             self.fresh = true;

@@ -1,7 +1,7 @@
 //! The interface of an FMU: variables, value references, model description, GUID.
 //!
-//! The table built here is the only place that knows value references. The XML file and the accessors of the
-//! running instance are both read from it.
+//! The table built here is the only source of value references. Both the XML file and the accessors of the
+//! running instance are derived from it.
 
 mod arrays;
 mod description;
@@ -36,7 +36,7 @@ pub const LOG_CATEGORIES: [(&str, &str); 3] = [
 
 /// Everything derived from one configuration.
 pub struct Product {
-    /// The configuration, completed.
+    /// The configuration, with every value filled in.
     pub configuration: Configuration,
     /// The variables; the value reference of each is its index.
     pub variables: Vec<Variable>,
@@ -44,9 +44,9 @@ pub struct Product {
     pub layout: Layout,
     /// The ranges of the parameters, in the order of the table.
     pub ranges: Vec<Range>,
-    /// `{…}`: differs between FMUs that differ in configuration, variables or version.
+    /// `{…}`: differs between FMUs with different configurations, variables or versions.
     pub guid: String,
-    /// The variables of an FMU for FMI 3.0, in the order of their value references; none for FMI 2.0, whose
+    /// The variables of an FMU for FMI 3.0, in the order of their value references; empty for FMI 2.0, whose
     /// variables are those of the table.
     pub items: Vec<Item>,
 }
@@ -54,8 +54,8 @@ pub struct Product {
 /// Value references of the groups of variables, in the order of the table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Layout {
-    /// Number of states: the first inputs of a filter (with the inputs of its barriers) or
-    /// controller (with the goal where it is an input), the outputs of a plant.
+    /// Number of states: the first inputs of a filter (with the inputs of its barriers) or controller (with
+    /// the goal if it is an input), the outputs of a plant.
     pub states: usize,
     /// Number of inputs of the plant.
     pub inputs: usize,
@@ -63,7 +63,7 @@ pub struct Layout {
     pub outputs: usize,
     /// First parameter.
     pub parameters: usize,
-    /// One past the last parameter: the first code, where there are [codes](Product::enumerated).
+    /// One past the last parameter: the first code, if there are [codes](Product::enumerated).
     pub end: usize,
 }
 
@@ -72,7 +72,7 @@ impl Product {
     ///
     /// # Errors
     ///
-    /// A name that FMI 3.0 needs for itself, in a configuration with `fmi = 3`.
+    /// With `fmi = 3`, a name that FMI 3.0 reserves.
     pub fn new(configuration: Configuration) -> Result<Self, ConfigurationError> {
         let (Table { variables, ranges }, layout) = match &configuration {
             Configuration::Filter(c) => filter_variables(c),
@@ -93,19 +93,20 @@ impl Product {
         Ok(Self { configuration, variables, layout, ranges, guid, items })
     }
 
-    /// The variable of FMI 3.0 that has the scalar `index`, which must be one of the table's.
+    /// The variable of FMI 3.0 that contains the scalar `index` of the table.
     pub(crate) fn item_of(&self, index: usize) -> &Item {
         let after = self.items.partition_point(|item| item.scalars.start <= index);
         &self.items[after.saturating_sub(1)]
     }
 
-    /// What an importer of FMI 3.0 may do with each value reference; nothing for FMI 2.0.
+    /// The access that importers of FMI 3.0 have to each value reference; empty for FMI 2.0.
     pub(crate) fn accesses(&self) -> Vec<Access> {
         arrays::accesses(&self.variables, &self.items)
     }
 
-    /// The outputs that are enumerations. Each has a twin that is an Integer, from [`Layout::end`] on in the same order:
-    /// some importers drop enumerations. (They come last, so that every other variable kept its value reference.)
+    /// The outputs that are enumerations. Each has an Integer twin, from [`Layout::end`] on in the same
+    /// order, for importers that drop enumerations. (They come last, so that every other variable kept its
+    /// value reference.)
     pub fn enumerated(&self) -> impl Iterator<Item = usize> + '_ {
         enumerated(&self.variables)
     }
@@ -171,12 +172,12 @@ impl Product {
     }
 }
 
-/// What the library of every FMU holds to tell its version by.
+/// A text in the library of every FMU that identifies its version.
 pub const MARK: &str = concat!("punctual ", env!("CARGO_PKG_VERSION"), "\n");
 
 /// The GUID: a name-based UUID (version 5) over version, canonical configuration and variable table.
 fn guid(canonical: &str, variables: &[Variable]) -> String {
-    // Without the box the mark might become immediate operands, and be found in no library.
+    // Without the black box, the mark could become immediate operands and not be found in any library.
     let mut text = format!("{}{canonical}\n", std::hint::black_box(MARK));
     for v in variables {
         let (causality, variability) = (v.causality.as_str(), v.variability.as_str());
@@ -186,7 +187,7 @@ fn guid(canonical: &str, variables: &[Variable]) -> String {
     format!("{{{}}}", Uuid::new_v5(&Uuid::NAMESPACE_OID, text.as_bytes()))
 }
 
-/// The units used. One that [`base_unit`] cannot read is left out, and the XML is then refused.
+/// The units used. One that [`base_unit`] cannot read is omitted, and the XML is then refused.
 fn units<'a>(names: impl Iterator<Item = &'a str>) -> Vec<Unit> {
     let mut names: Vec<&str> = names.collect();
     names.sort_unstable();
@@ -199,7 +200,7 @@ fn units<'a>(names: impl Iterator<Item = &'a str>) -> Vec<Unit> {
         .collect()
 }
 
-/// What the name of the Integer twin of an enumeration ends in.
+/// The suffix of the Integer twin of an enumeration.
 pub const CODE: &str = "_code";
 
 /// The positions of the outputs that are enumerations.
@@ -244,7 +245,7 @@ fn assurance_type() -> SimpleType {
     enumeration(ASSURANCE, "Status of the guarantee of a filter that follows plans", &items)
 }
 
-/// Collects variables; the value reference is the index.
+/// Collects variables; their value references are their indices.
 #[derive(Default)]
 struct Table {
     variables: Vec<Variable>,
@@ -325,8 +326,8 @@ impl Table {
         }
     }
 
-    /// Adds the parameters of `configuration`, which come after the outputs, then the codes, and completes `layout` with
-    /// their position.
+    /// Adds the parameters of `configuration`, which come after the outputs, then the codes, and completes
+    /// `layout` with their positions.
     fn finish<C: Clone>(
         mut self,
         configuration: &C,
@@ -407,7 +408,7 @@ fn filter_variables(c: &FilterConfiguration) -> (Table, Layout) {
         let ahead = "what the filter has integrated, at the end of the step; u is its mean over the step";
         table.add(format!("integrator.{name}"), ahead, output, real(None, unit));
     }
-    // Every output follows from all inputs at once, or from nothing until a step.
+    // Every output depends on all inputs immediately, or on none until a step.
     let direct: Vec<u32> = if c.direct_feedthrough { (0..outputs as u32).collect() } else { Vec::new() };
     for variable in &mut table.variables[outputs..] {
         variable.dependencies = Some(direct.clone());
@@ -440,7 +441,8 @@ fn plant_variables(c: &PlantConfiguration) -> (Table, Layout) {
         let variable = table.signal("y", output, "", Causality::Output);
         variable.dependencies = Some(Vec::new());
         if c.experiment.fmi == FmiVersion::Three {
-            // At the start it may depend on any state and constant. With FMI 2.0 that is what is said by nothing.
+            // At the start, it may depend on any state and constant. In FMI 2.0, omitting the dependencies
+            // means just that.
             let all = parameters..parameters + rows.len();
             variable.initial_dependencies = Some(all.map(|i| i as u32).collect());
         }
@@ -460,7 +462,7 @@ fn controller_variables(c: &ControllerConfiguration) -> (Table, Layout) {
     }
     let outputs = table.variables.len();
     for (i, input) in inputs.iter().enumerate() {
-        // Damping depends on the states that it opposes; a goal is sought with all of them.
+        // Damping depends on the states that it opposes; driving to a goal depends on all of them.
         let dependencies = match c.controller {
             _ if !c.direct_feedthrough => Vec::new(),
             Controller::Damping { .. } => {

@@ -1,17 +1,18 @@
-//! A snapshot of an instance as bytes.
+//! Serialises a snapshot of an instance.
 //!
-//! | bytes | hold |
+//! | bytes | content |
 //! |---|---|
 //! | 8 | `PUNCTUAL` |
 //! | 4 | version of this layout |
 //! | 38 | the GUID of the FMU, as in its model description |
-//! | 8 | length of all |
+//! | 8 | total length |
 //! | … | the fields of [`State`]: mode, time, flags, values in the order of the table, memory of the block |
-//! | 8 + … | where plans are followed: the length of the plan state, and that in the format of the crate postcard |
-//! | 4 | CRC-32 of all before |
+//! | 8 + … | if plans are followed: the length of the plan state, and the plan state in the format of the crate postcard |
+//! | 4 | CRC-32 of everything before |
 //!
-//! Numbers are little-endian, by their bits. A field has the same place in every state of an FMU; optional ones
-//! keep theirs. Only a plan has no fixed length, and it comes last. Damaged bytes, and those of another FMU, are refused by the name of the field.
+//! Numbers are stored bitwise, in little-endian order. A field has the same offset in every state of an FMU;
+//! absent optional fields keep their space. Only a plan has variable length, and it comes last. Damaged
+//! bytes, and those of another FMU, are refused with the name of the field.
 
 use punctual_core::convergence::{FixedTimeState, Phase, Unmet};
 use punctual_core::filter::{Curvature, FilterState, PlanState};
@@ -24,7 +25,7 @@ use crate::product::Product;
 
 const MAGIC: [u8; 8] = *b"PUNCTUAL";
 
-/// Version of the layout, to be raised with every change of it. (The GUID changes with the version of the
+/// Version of the layout, to be increased with every change of it. (The GUID changes with the version of the
 /// library.)
 const VERSION: u32 = 11;
 
@@ -32,17 +33,17 @@ const GUID: usize = 38;
 const HEADER: usize = MAGIC.len() + u32::SIZE + GUID + u64::SIZE;
 const CHECKSUM: usize = u32::SIZE;
 
-/// The number of bytes of `state`, a state of `product`: that of all of them, but for a plan.
+/// The number of bytes of `state`, a state of `product`. Without a plan, it is the same for all of them.
 ///
 /// # Errors
 ///
-/// None in practice: a plan state is plain data.
+/// None in practice, since a plan state is plain data.
 pub fn size(product: &Product, state: &State) -> Result<usize, Failure> {
     let plan = if follows_plans(product) { u64::SIZE + plan(state)?.len() } else { 0 };
     Ok(fixed_size(product) + plan)
 }
 
-/// Whether a state of `product` has a stop time: those of FMI 2.0 have none.
+/// Whether a state of `product` has a stop time; in FMI 2.0 it has none.
 fn has_stop(product: &Product) -> bool {
     product.configuration.experiment().fmi == FmiVersion::Three
 }
@@ -60,7 +61,7 @@ fn plan(state: &State) -> Result<Vec<u8>, Failure> {
     .map_err(|e| e.to_string())
 }
 
-/// The number of bytes of every state of `product`, but for plans.
+/// The number of bytes of every state of `product`, without plans.
 fn fixed_size(product: &Product) -> usize {
     let flags = Mode::SIZE + 2 * f64::SIZE + 3 * bool::SIZE;
     let value = |base| match base {
@@ -144,7 +145,7 @@ pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), F
         BlockState::Plant { x } => x.iter().for_each(|x| x.write(&mut out)),
         BlockState::Controller { waypoint } => waypoint.write(&mut out),
     }
-    // The checksum, and the whole at once.
+    // The checksum, and everything at once.
     let checksum = crc32(&out);
     checksum.write(&mut out);
     if out.len() != size {
@@ -160,9 +161,9 @@ pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), F
 ///
 /// # Errors
 ///
-/// Bytes that are not such a state: the field, the value found and those allowed.
+/// Bytes that are not such a state; the message gives the field, the value found and those allowed.
 pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
-    // The header: does it belong to a state of this product, and is all of it there?
+    // The header: does it belong to a state of this product, and is it complete?
     let fixed = fixed_size(product);
     let mut input = Reader { rest: bytes };
     if input.take("magic number", MAGIC.len())? != MAGIC {
@@ -243,7 +244,7 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
     Ok(State { guid, mode, time, stop, stepped, last_step, fresh, configured, values, block })
 }
 
-/// The plan state that comes last. Whether it is one of this filter is found when it is restored.
+/// The plan state, which comes last. Whether it belongs to this filter is checked when it is restored.
 fn read_plan(input: &mut Reader) -> Result<PlanState, Failure> {
     let length: u64 = input.field("length of the plan")?;
     if length != input.rest.len() as u64 {
@@ -289,7 +290,7 @@ fn crc32(bytes: &[u8]) -> u32 {
     })
 }
 
-/// The bytes that are still to be read.
+/// The bytes still to be read.
 struct Reader<'a> {
     rest: &'a [u8],
 }
@@ -313,7 +314,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// A field with a fixed number of bytes.
+/// A field of fixed size.
 trait Field: Sized {
     const SIZE: usize;
     fn write(&self, out: &mut Vec<u8>);
@@ -356,7 +357,7 @@ impl Field for bool {
     }
 }
 
-/// The number of a phase, in one byte.
+/// The number of a phase, as one byte.
 impl Field for Phase {
     const SIZE: usize = 1;
 
@@ -375,7 +376,7 @@ impl Field for Mode {
     const SIZE: usize = 1;
 
     fn write(&self, out: &mut Vec<u8>) {
-        // A number that is no mode's is refused when it is read.
+        // A number that is not a mode is refused when it is read.
         let index = Self::EACH.iter().position(|mode| mode == self).unwrap_or(Self::EACH.len());
         out.push(index as u8);
     }
@@ -427,7 +428,8 @@ type Inputs = [f64; punctual_core::MAX_INPUTS];
 /// The type of `FilterState::curvatures`.
 type Curvatures = [Option<Curvature>; 2];
 
-/// Writes and reads structures field by field: one that is missing here, or of another type, does not compile.
+/// Writes and reads structures field by field. A field that is missing here, or has another type, does not
+/// compile.
 macro_rules! structure {
     ($kind:ident { $($field:ident: $type:ty),* $(,)? }) => {
         impl Field for $kind {

@@ -1,20 +1,22 @@
-//! Numbers for people, in every text that is not read by a machine: four significant digits, and no unit of 1.
+//! Formats numbers for the reader, in every text that is not machine-readable: four significant digits, and
+//! no unit 1.
 
 /// Digits after the first one.
 const MORE: usize = 3;
 
-/// The largest round-off of a number, as a part of it: what is within it of a short number is that.
+/// The largest relative round-off of a number: within it of a short number, the short number is shown.
 const ROUND_OFF: f64 = 1e-9;
 
-/// A whole number from here on is written with a power of ten, as the others are from 10⁴ on.
+/// From here on, whole numbers use exponent notation, as other numbers do from 10⁴ on.
 const LONG: f64 = 1e6;
 
-/// A number for people: four significant digits, or all of a whole number below 10⁶; powers of ten where they help.
+/// A number for the reader: four significant digits, or all digits of a whole number below 10⁶; exponent
+/// notation if it helps.
 pub fn number(value: f64) -> String {
     if !value.is_finite() {
         return value.to_string();
     }
-    // Adding 0 takes the sign from -0.
+    // Adding 0 removes the sign of -0.
     if value.abs() < LONG && value.floor() == value {
         return (value + 0.0).to_string();
     }
@@ -29,7 +31,8 @@ pub fn number(value: f64) -> String {
     }
 }
 
-/// A [`number`] that is not below `value`, finite: for what has to be had, such as a deadline.
+/// A [`number`] that is not below `value`, which is finite: for a value that must be reached, such as a
+/// deadline.
 pub fn number_above(value: f64) -> String {
     let text = number(value);
     if text.parse().is_ok_and(|read: f64| read < value - ROUND_OFF * value.abs()) {
@@ -39,7 +42,7 @@ pub fn number_above(value: f64) -> String {
     }
 }
 
-/// A [`number`] that is not above `value`, finite: for what is certain until then.
+/// A [`number`] that is not above `value`, which is finite: for a time until which something is certain.
 pub fn number_below(value: f64) -> String {
     let text = number(value);
     if text.parse().is_ok_and(|read: f64| read > value + ROUND_OFF * value.abs()) {
@@ -49,14 +52,14 @@ pub fn number_below(value: f64) -> String {
     }
 }
 
-/// Half a unit of the last digit that is shown.
+/// Half a unit of the last digit shown.
 fn half_unit(value: f64) -> f64 {
     let text = format!("{value:e}");
     let exponent = text.split_once('e').and_then(|(_, exponent)| exponent.parse().ok());
     exponent.map_or(0.0, |exponent: i32| format!("5e{}", exponent - MORE as i32 - 1).parse().unwrap_or(0.0))
 }
 
-/// A [`number`] with its unit, where it has one.
+/// A [`number`] with its unit, if it has one.
 pub fn quantity(value: f64, unit: &str) -> String {
     match shown_unit(unit) {
         "" => number(value),
@@ -64,12 +67,12 @@ pub fn quantity(value: f64, unit: &str) -> String {
     }
 }
 
-/// The unit for people, who read nothing where it is 1.
+/// The unit for display, which is empty for 1.
 pub fn shown_unit(unit: &str) -> &str {
     if unit == "1" { "" } else { unit }
 }
 
-/// A name with the unit of its numbers, as for an axis: "h (m)"; the name alone where there is none.
+/// A name with the unit of its numbers, as for an axis: "h (m)"; only the name if there is no unit.
 pub fn labelled(name: &str, unit: &str) -> String {
     match shown_unit(unit) {
         "" => name.to_owned(),
@@ -110,7 +113,8 @@ mod tests {
         }
     }
 
-    /// Of numbers of every size: read back, the text is the number to half a unit of the fourth digit, and it is short.
+    /// For numbers of every size, the text reads back to within half a unit of the fourth digit, and it is
+    /// short.
     #[test]
     fn numbers_keep_four_digits() {
         let mut bits = 1_u64;

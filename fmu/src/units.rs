@@ -1,49 +1,50 @@
-//! The units of two variables that are connected: whether they are the same, what makes one of the other, or why
-//! nothing does. A definition in base units counts. Where there is none, the name is read as tools write it.
+//! Compares the units of two connected variables: whether they are the same, how to convert between them, or
+//! why that is impossible. A definition in base units takes precedence. If there is none, the name is read as
+//! tools write it.
 
 pub use punctual_modeldescription::BaseUnit;
 
 use crate::configuration::{multiply, symbol_of};
 
-/// What a model description says of the unit of a variable.
+/// What a model description says about the unit of a variable.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Said<'a> {
-    /// Its name; absent: nothing is said.
+    /// Its name, if given.
     pub name: Option<&'a str>,
     /// Its definition in base units, if there is one.
     pub base: Option<BaseUnit>,
-    /// Whether offsets do not count, as in differences of temperature (`relativeQuantity`).
+    /// Whether offsets are ignored, as for differences of temperature (`relativeQuantity`).
     pub is_difference: bool,
 }
 
-/// How a value becomes one in another unit.
+/// How a value converts to another unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fit {
-    /// It stays as it is.
+    /// It is unchanged.
     Same,
     /// It becomes `factor · value + offset`.
     Scaled {
-        /// Units after per unit before, > 0.
+        /// Target units per source unit, > 0.
         factor: f64,
-        /// In the unit after.
+        /// In the target unit.
         offset: f64,
     },
-    /// At least one of the units says nothing that can be compared.
+    /// At least one of the units is not comparable.
     Unknown,
 }
 
-/// Round-off of definitions, in parts of 1: `0.0174533` is a degree.
+/// Relative round-off of definitions: `0.0174533` is a degree.
 const ROUND_OFF: f64 = 1e-6;
 
-/// The same for two units of one name.
+/// The same for two units with the same name.
 const NAMESAKES: f64 = 1e-3;
 
-/// How a value of a variable in the one unit becomes one of a variable in the other.
+/// How a value of a variable in one unit converts to that of a variable in the other.
 ///
 /// # Errors
 ///
-/// Units of different quantities; a frequency where radians are counted, which may mean turns; a difference of
-/// temperature and a temperature: the reason.
+/// Units of different quantities; a frequency converted to a unit with radians, which may mean revolutions; a
+/// difference of temperature converted to a temperature. The error gives the reason.
 pub fn fit(from: &Said<'_>, to: &Said<'_>) -> Result<Fit, &'static str> {
     let name = |said: &Said<'_>| {
         said.name.map(str::trim).filter(|name| !["", "-"].contains(name)).map(str::to_owned)
@@ -51,13 +52,13 @@ pub fn fit(from: &Said<'_>, to: &Said<'_>) -> Result<Fit, &'static str> {
     let names = [name(from), name(to)];
     let [a, b] = [from, to].map(known);
     let (Some(a), Some(b)) = (a, b) else {
-        // Two that say nothing, or are without dimension; or one name that nobody knows.
+        // Two units that are unspecified or dimensionless, or have the same unknown name.
         let is_plain = |base: Option<BaseUnit>, name: &Option<String>| base.map_or(name.is_none(), is_plain);
         let same = names[0] == names[1] || is_plain(a, &names[0]) && is_plain(b, &names[1]);
         return Ok(if same { Fit::Same } else { Fit::Unknown });
     };
     if dimension(&a) != dimension(&b) {
-        // `1` may be no more than unsaid.
+        // `1` may just mean that no unit is given.
         let unsaid = is_plain(a) || is_plain(b);
         return if unsaid { Ok(Fit::Unknown) } else { Err("which measures another quantity") };
     }
@@ -79,27 +80,27 @@ pub fn fit(from: &Said<'_>, to: &Said<'_>) -> Result<Fit, &'static str> {
     Ok(if is_same { Fit::Same } else { Fit::Scaled { factor, offset } })
 }
 
-/// The definition of a unit, its own or by its name.
+/// The definition of a unit, either its own or that of its name.
 fn known(said: &Said<'_>) -> Option<BaseUnit> {
     let own =
         said.base.filter(|base| base.factor.is_finite() && base.factor > 0.0 && base.offset.is_finite());
     own.or_else(|| named(said.name?))
 }
 
-/// Whether it is the number 1 and nothing else.
+/// Whether it is just the number 1.
 fn is_plain(base: BaseUnit) -> bool {
     base == BaseUnit::default()
 }
 
-/// The exponents, without that of the radian, which is 1 as far as FMI is concerned.
+/// The exponents without that of the radian, which is 1 in FMI.
 fn dimension(base: &BaseUnit) -> [i32; 7] {
     [base.kg, base.m, base.s, base.a, base.k, base.mol, base.cd]
 }
 
-/// Temperatures, with the factor and offset that make kelvins. In a product they are differences.
+/// Temperature units, with the factor and offset that convert to kelvins. In a product they are differences.
 const TEMPERATURES: [(&str, f64, f64); 2] = [("degC", 1.0, 273.15), ("degF", 5.0 / 9.0, 459.67 * 5.0 / 9.0)];
 
-/// What tools write for a sign, in the order in which it is replaced.
+/// Notations that tools use for a sign, in the order in which they are replaced.
 const SIGNS: [(&str, &str); 23] = [
     ("**", "^"),
     ("\u{25}", "percent"),
@@ -126,7 +127,7 @@ const SIGNS: [(&str, &str); 23] = [
     (" ", "."),
 ];
 
-/// What tools write for a unit.
+/// Notations that tools use for a unit.
 const WORDS: [(&str, &str); 39] = [
     ("sec", "s"),
     ("second", "s"),
@@ -169,8 +170,8 @@ const WORDS: [(&str, &str); 39] = [
     ("kNm", "kN.m"),
 ];
 
-/// The definition of a unit by its name as any tool may write it: `m/s2`, `m/s^2`, `m.s-2`, `kg*m²/(s²·A)`, `°C`. `None` for
-/// one that is not known, or that two tools read differently, as `kg/m.s`.
+/// The definition of a unit by its name as any tool may write it: `m/s2`, `m/s^2`, `m.s-2`, `kg*m²/(s²·A)`,
+/// `°C`. `None` if the name is unknown, or if tools disagree on its meaning, as for `kg/m.s`.
 pub fn named(name: &str) -> Option<BaseUnit> {
     /// Longest name.
     const LENGTH: usize = 64;
@@ -188,13 +189,13 @@ pub fn named(name: &str) -> Option<BaseUnit> {
     (reader.rest.is_empty() && base.factor.is_finite() && base.factor > 0.0).then_some(base)
 }
 
-/// Reads a name from the left.
+/// Parses a name from the left.
 struct Reader<'a> {
     rest: &'a str,
 }
 
 impl Reader<'_> {
-    /// Whether it goes on with `sign`, which is passed over.
+    /// Whether `sign` follows; if so, it is consumed.
     fn passes(&mut self, sign: char) -> bool {
         let rest = self.rest.strip_prefix(sign);
         self.rest = rest.unwrap_or(self.rest);
@@ -210,7 +211,7 @@ impl Reader<'_> {
                 () if self.passes('.') => 1,
                 () => return Some(product),
             };
-            // Whether the dot binds more than the stroke depends on the tool.
+            // Whether the dot binds more tightly than the slash depends on the tool.
             if is_divided && sign == 1 {
                 return None;
             }
@@ -246,7 +247,7 @@ impl Reader<'_> {
         symbol_of(symbol).or_else(temperature).or_else(word)
     }
 
-    /// The exponent that follows; 1 where none does.
+    /// The exponent that follows; 1 if there is none.
     fn exponent(&mut self) -> Option<i32> {
         /// Largest exponent; a larger one would be a mistake.
         const LARGEST: i32 = 99;
@@ -274,7 +275,7 @@ mod tests {
         Said { name: Some(name), ..Said::default() }
     }
 
-    /// The value 7 in a unit, in another.
+    /// The value 7, converted between two units.
     fn seven(from: &str, to: &str) -> f64 {
         match fit(&said(from), &said(to)).unwrap_or_else(|why| panic!("{from}, {to}: {why}")) {
             Fit::Same => 7.0,
@@ -285,7 +286,7 @@ mod tests {
 
     #[test]
     fn units_are_converted_as_pint_converts_them() {
-        // 7 of the first in the second, as pint 0.25.3 has it.
+        // 7 of the first unit in the second, according to pint 0.25.3.
         for (from, to, wanted) in [
             ("cm", "m", 0.07),
             ("deg", "rad", 0.122_173_047_639_603_07),
@@ -409,10 +410,10 @@ mod tests {
         };
         assert_eq!(fit(&of("smoot", 1.7), &said("m")), Ok(Fit::Scaled { factor: 1.7, offset: 0.0 }));
         assert_eq!(fit(&of("gal", 2.0), &of("gal", 1.0)), Ok(Fit::Scaled { factor: 2.0, offset: 0.0 }));
-        // Digits that somebody left out are no other unit.
+        // A rounded factor is not a different unit.
         assert_eq!(fit(&of("ft", 0.3048), &of("ft", 0.305)), Ok(Fit::Same));
         assert_eq!(fit(&of("foot", 0.304_800_1), &of("ft", 0.3048)), Ok(Fit::Same));
-        // What is no definition counts for nothing.
+        // An invalid definition is ignored.
         assert_eq!(fit(&of("cm", 0.0), &said("m")), Ok(Fit::Scaled { factor: 0.01, offset: 0.0 }));
         assert_eq!(fit(&of("cm", f64::NAN), &said("cm")), Ok(Fit::Same));
     }

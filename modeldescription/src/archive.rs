@@ -1,7 +1,8 @@
-//! The `.fmu` or `.ssp` file: a zip archive whose bytes depend on nothing but its entries and one given instant.
+//! The `.fmu` or `.ssp` file: a zip archive whose bytes depend only on its entries and one given instant.
 //!
-//! Reproducible means: sorted entries, one fixed time for all of them, fixed permissions and a fixed compression
-//! level, whatever the operating system. Another version of the compression library may compress to other bytes.
+//! Reproducible means: sorted entries, one fixed time for all of them, fixed permissions and a fixed
+//! compression level, on every operating system. Another version of the compression library may produce other
+//! bytes.
 
 use crate::Error;
 use crate::calendar::days_in_month;
@@ -10,10 +11,10 @@ use std::io::{Cursor, Write};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, System, ZipWriter};
 
-/// The entry that readers want to find first.
+/// The entry that comes first, where readers want to find it.
 const MODEL_DESCRIPTION: &str = "modelDescription.xml";
 
-/// Deflate level: 6 is the usual balance of size and time. Fixed, since it decides the bytes.
+/// Deflate level: 6 is the usual balance of size and time. It is fixed, since it determines the bytes.
 const LEVEL: i64 = 6;
 
 /// The instant that every entry of an archive is stamped with.
@@ -31,17 +32,17 @@ impl Timestamp {
     /// 2107-12-31 23:59:59 UTC, the end of the range of a zip archive.
     const LAST: u64 = 4_354_819_199;
 
-    /// Reads the value of the convention `SOURCE_DATE_EPOCH`: seconds since 1970-01-01 00:00:00 UTC in
-    /// decimal digits, 315532800 (1980-01-01) to 4354819199 (2107-12-31 23:59:59).
+    /// Reads the value of `SOURCE_DATE_EPOCH`: seconds since 1970-01-01 00:00:00 UTC in decimal digits,
+    /// 315532800 (1980-01-01) to 4354819199 (2107-12-31 23:59:59).
     ///
-    /// The archive stores two-second steps and rounds down. This crate never reads the environment: its caller
-    /// reads it and passes the text on.
+    /// The archive stores two-second steps and rounds down. This crate never reads the environment; the
+    /// caller passes the text in.
     ///
     /// # Errors
     ///
-    /// The text has anything but digits, or the number is out of range.
+    /// The text contains other characters than digits, or the number is out of range.
     pub fn from_source_date_epoch(text: &str) -> Result<Self, Error> {
-        // `parse` alone would take a leading plus.
+        // `parse` alone would accept a leading plus.
         let digits = text.bytes().all(|b| b.is_ascii_digit());
         match text.parse() {
             Ok(seconds) if digits && (Self::FIRST..=Self::LAST).contains(&seconds) => Ok(Self { seconds }),
@@ -65,7 +66,7 @@ impl Timestamp {
 
     fn to_zip(self) -> DateTime {
         let (year, month, day, hour, minute, second) = self.civil();
-        // Every field fits its bits because the range was checked: 7 bits of years, 5 of two-second steps.
+        // Every field fits its bits, since the range was checked: 7 bits of years, 5 of two-second steps.
         let date = ((year - 1980) << 9) | (month << 5) | day;
         let time = (hour << 11) | (minute << 5) | (second / 2);
         let words = u16::try_from(date).ok().zip(u16::try_from(time).ok());
@@ -115,7 +116,7 @@ impl Archive {
     ///
     /// # Errors
     ///
-    /// The archive is then as before.
+    /// The archive is unchanged on an error.
     ///
     /// - `path` is empty, absolute, ends with a slash, has an empty, `.` or `..` component, a
     ///   backslash, a colon or a control character, or more than 65535 bytes.
@@ -148,23 +149,22 @@ impl Archive {
         Ok(())
     }
 
-    /// Paths and contents in the order of the archive: `modelDescription.xml`, then by path in order
-    /// of bytes.
+    /// Paths and contents in the order of the archive: `modelDescription.xml`, then by path in byte order.
     pub fn entries(&self) -> impl Iterator<Item = (&str, &[u8])> {
         let first = self.entries.get_key_value(MODEL_DESCRIPTION).into_iter();
         let others = self.entries.iter().filter(|(path, _)| *path != MODEL_DESCRIPTION);
         first.chain(others).map(|(path, bytes)| (path.as_str(), bytes.as_slice()))
     }
 
-    /// Writes the zip archive as [`to_bytes`](Self::to_bytes) makes it.
+    /// Writes the zip archive that [`to_bytes`](Self::to_bytes) makes.
     ///
     /// # Errors
     ///
     /// - The archive is larger than its format allows. Then nothing is written.
-    /// - The destination cannot be written. The bytes written until then are no valid archive.
+    /// - The destination cannot be written. The bytes written so far are not a valid archive.
     pub fn write_to<W: Write>(&self, mut destination: W) -> Result<(), Error> {
-        // The bytes are complete before they are written: when a destination fails, the zip crate prints to
-        // standard error.
+        // The bytes are complete before they are written, since the zip crate prints to standard error if a
+        // destination fails.
         let bytes = self.to_bytes()?;
         let written = destination.write_all(&bytes).and_then(|()| destination.flush());
         written.map_err(|error| Error::io("write the archive", error))

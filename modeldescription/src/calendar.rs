@@ -1,4 +1,4 @@
-//! The Gregorian calendar, as far as dates in the description and the archive need it.
+//! The parts of the Gregorian calendar that dates in the description and the archive need.
 
 /// The days of a month (1 to 12) of a year; 0 for a month that does not exist.
 pub(crate) fn days_in_month(year: u64, month: u64) -> u64 {

@@ -21,11 +21,11 @@ words!(NamingConvention: Flat "flat", Structured "structured");
 pub struct SimpleType {
     /// The name; not empty, unique among the types, not the name of a variable, one line.
     pub name: String,
-    /// Meaning for a human; empty: the attribute is absent.
+    /// Its meaning, as a text for the reader; if empty, the attribute is omitted.
     pub description: String,
-    /// Attributes that variables take over where they do not give them themselves.
+    /// Default attributes of variables that do not give their own.
     pub kind: VariableKind,
-    /// The items of an enumeration; at least one, names and values unique. Of other types none.
+    /// The items of an enumeration, at least one, with unique names and values; empty for other types.
     pub items: Vec<EnumerationItem>,
 }
 
@@ -48,15 +48,15 @@ pub struct EnumerationItem<V = i32> {
     /// The name; not empty, one line.
     #[serde(rename = "@name")]
     pub name: String,
-    /// The number that stands for it in the C interface, dimensionless.
+    /// Its number in the C interface, dimensionless.
     #[serde(rename = "@value")]
     pub value: V,
-    /// Meaning for a human; empty: the attribute is absent.
+    /// Its meaning, as a text for the reader; if empty, the attribute is omitted.
     #[serde(rename = "@description", skip_serializing_if = "String::is_empty")]
     pub description: String,
 }
 
-/// Default start, stop and step of a simulation, unless the user says otherwise.
+/// Default start, stop and step of a simulation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct DefaultExperiment {
     /// Start time in seconds; finite, default 0.
@@ -87,7 +87,7 @@ pub struct LogCategory {
     /// The name as passed to the logger; not empty, unique, one line.
     #[serde(rename = "@name")]
     pub name: String,
-    /// Meaning for a human; empty: the attribute is absent.
+    /// Its meaning, as a text for the reader; if empty, the attribute is omitted.
     #[serde(rename = "@description", skip_serializing_if = "String::is_empty")]
     pub description: String,
 }
@@ -95,31 +95,31 @@ pub struct LogCategory {
 /// Identity and capabilities for model exchange (FMI 2.0.4, section 3.3.1). All flags are false by default.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ModelExchange {
-    /// The name of the shared library without its ending: a C identifier in ASCII.
+    /// The name of the shared library without its extension: a C identifier in ASCII.
     #[serde(rename = "@modelIdentifier")]
     pub model_identifier: String,
-    /// The FMU needs another program to run.
+    /// Whether the FMU needs another program to run.
     #[serde(rename = "@needsExecutionTool", skip_serializing_if = "xsd::is_default")]
     pub needs_execution_tool: bool,
-    /// `fmi2CompletedIntegratorStep` need not be called.
+    /// Whether `fmi2CompletedIntegratorStep` need not be called.
     #[serde(rename = "@completedIntegratorStepNotNeeded", skip_serializing_if = "xsd::is_default")]
     pub completed_integrator_step_not_needed: bool,
-    /// Only one instance can exist in one process.
+    /// Whether only one instance can exist in one process.
     #[serde(rename = "@canBeInstantiatedOnlyOncePerProcess", skip_serializing_if = "xsd::is_default")]
     pub can_be_instantiated_only_once_per_process: bool,
-    /// The FMU does not use the memory functions of the importer.
+    /// Whether the FMU does not use the memory functions of the importer.
     #[serde(rename = "@canNotUseMemoryManagementFunctions", skip_serializing_if = "xsd::is_default")]
     pub can_not_use_memory_management_functions: bool,
-    /// `fmi2GetFMUstate`, `fmi2SetFMUstate` and `fmi2FreeFMUstate` work.
+    /// Whether `fmi2GetFMUstate`, `fmi2SetFMUstate` and `fmi2FreeFMUstate` work.
     #[serde(rename = "@canGetAndSetFMUstate", skip_serializing_if = "xsd::is_default")]
     pub can_get_and_set_state: bool,
-    /// The state can be turned to bytes and back; needs `can_get_and_set_state`.
+    /// Whether states can be serialised; requires `can_get_and_set_state`.
     #[serde(rename = "@canSerializeFMUstate", skip_serializing_if = "xsd::is_default")]
     pub can_serialize_state: bool,
-    /// `fmi2GetDirectionalDerivative` works.
+    /// Whether `fmi2GetDirectionalDerivative` works.
     #[serde(rename = "@providesDirectionalDerivative", skip_serializing_if = "xsd::is_default")]
     pub provides_directional_derivative: bool,
-    /// Names of the files of its source code, relative to `sources/`; none: it comes without.
+    /// Names of its source files, relative to `sources/`; empty if there are none.
     #[serde(
         rename = "SourceFiles",
         skip_serializing_if = "Vec::is_empty",
@@ -131,41 +131,41 @@ pub struct ModelExchange {
 /// Identity and capabilities of the slave (FMI 2.0.4, section 4.3.1). All flags are false by default.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct CoSimulation {
-    /// The name of the shared library without its ending: a C identifier in ASCII.
+    /// The name of the shared library without its extension: a C identifier in ASCII.
     #[serde(rename = "@modelIdentifier")]
     pub model_identifier: String,
-    /// The slave needs another program to run.
+    /// Whether the slave needs another program to run.
     #[serde(rename = "@needsExecutionTool", skip_serializing_if = "xsd::is_default")]
     pub needs_execution_tool: bool,
-    /// The step size may differ from call to call.
+    /// Whether the step size may differ from call to call.
     #[serde(rename = "@canHandleVariableCommunicationStepSize", skip_serializing_if = "xsd::is_default")]
     pub can_handle_variable_step: bool,
-    /// The slave uses `fmi2SetRealInputDerivatives`.
+    /// Whether the slave uses `fmi2SetRealInputDerivatives`.
     #[serde(rename = "@canInterpolateInputs", skip_serializing_if = "xsd::is_default")]
     pub can_interpolate_inputs: bool,
-    /// Highest derivative that `fmi2GetRealOutputDerivatives` gives, dimensionless; 0: none.
+    /// Highest derivative that `fmi2GetRealOutputDerivatives` provides, dimensionless; 0 if it provides none.
     #[serde(rename = "@maxOutputDerivativeOrder", skip_serializing_if = "xsd::is_default")]
     pub max_output_derivative_order: u32,
-    /// `fmi2DoStep` may return before the step is done.
-    // The schema spells it so.
+    /// Whether `fmi2DoStep` may return before the step is done.
+    // The spelling of the schema.
     #[serde(rename = "@canRunAsynchronuously", skip_serializing_if = "xsd::is_default")]
     pub can_run_asynchronously: bool,
-    /// Only one instance can exist in one process.
+    /// Whether only one instance can exist in one process.
     #[serde(rename = "@canBeInstantiatedOnlyOncePerProcess", skip_serializing_if = "xsd::is_default")]
     pub can_be_instantiated_only_once_per_process: bool,
-    /// The slave does not use the memory functions of the importer.
+    /// Whether the slave does not use the memory functions of the importer.
     #[serde(rename = "@canNotUseMemoryManagementFunctions", skip_serializing_if = "xsd::is_default")]
     pub can_not_use_memory_management_functions: bool,
-    /// `fmi2GetFMUstate`, `fmi2SetFMUstate` and `fmi2FreeFMUstate` work.
+    /// Whether `fmi2GetFMUstate`, `fmi2SetFMUstate` and `fmi2FreeFMUstate` work.
     #[serde(rename = "@canGetAndSetFMUstate", skip_serializing_if = "xsd::is_default")]
     pub can_get_and_set_state: bool,
-    /// The state can be turned to bytes and back; needs `can_get_and_set_state`.
+    /// Whether states can be serialised; requires `can_get_and_set_state`.
     #[serde(rename = "@canSerializeFMUstate", skip_serializing_if = "xsd::is_default")]
     pub can_serialize_state: bool,
-    /// `fmi2GetDirectionalDerivative` works.
+    /// Whether `fmi2GetDirectionalDerivative` works.
     #[serde(rename = "@providesDirectionalDerivative", skip_serializing_if = "xsd::is_default")]
     pub provides_directional_derivative: bool,
-    /// Names of the files of its source code, relative to `sources/`; none: it comes without.
+    /// Names of its source files, relative to `sources/`; empty if there are none.
     #[serde(
         rename = "SourceFiles",
         skip_serializing_if = "Vec::is_empty",
@@ -174,18 +174,18 @@ pub struct CoSimulation {
     pub source_files: Vec<String>,
 }
 
-/// Everything that `modelDescription.xml` of an FMI 2.0 co-simulation slave says.
+/// The content of `modelDescription.xml` of an FMI 2.0 co-simulation slave.
 ///
-/// The default is empty and not yet valid: name, GUID, model identifier and a variable are missing.
-/// Texts that are empty give no attribute, except where they are required.
+/// The default is empty and not yet valid: name, GUID, model identifier and a variable are missing. Empty
+/// texts give no attribute, except where one is required.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ModelDescription {
-    /// The name of the model for a human; not empty.
+    /// The name of the model for the reader; not empty.
     pub model_name: String,
-    /// The text that ties description and library together; not empty, one line. It differs for FMUs with
+    /// The text that links description and library; not empty, one line. It must differ between FMUs with
     /// different variables, since importers use it as a key.
     pub guid: String,
-    /// A description of the model, for a human.
+    /// A description of the model for the reader.
     pub description: String,
     /// The author of the model.
     pub author: String,
@@ -202,29 +202,29 @@ pub struct ModelDescription {
     pub generation_date_and_time: Option<String>,
     /// The convention by which variable names are built.
     pub variable_naming_convention: NamingConvention,
-    /// The interface for model exchange beside the one for co-simulation, if there is one. It has no event indicators.
+    /// The interface for model exchange beside the one for co-simulation, if any. It has no event indicators.
     pub model_exchange: Option<ModelExchange>,
     /// Identity and capabilities.
     pub co_simulation: CoSimulation,
-    /// The units that variables use; names unique.
+    /// The units that variables use, with unique names.
     pub units: Vec<Unit>,
-    /// The types that variables declare to have; names unique.
+    /// The types that variables can declare, with unique names.
     pub types: Vec<SimpleType>,
-    /// The categories of log messages; names unique.
+    /// The categories of log messages, with unique names.
     pub log_categories: Vec<LogCategory>,
-    /// Default start, stop and step; `None`: nothing is said.
+    /// Default start, stop and step, if given.
     pub default_experiment: Option<DefaultExperiment>,
-    /// The variables, at least one. Their order is that of the file.
+    /// The variables in the order of the file, at least one.
     pub variables: Vec<Variable>,
 }
 
 impl ModelDescription {
-    /// The variable of an index of [`ModelStructure`](crate::ModelStructure), counted from 1.
+    /// The variable with this index of [`ModelStructure`](crate::ModelStructure), counted from 1.
     pub fn at(&self, index: u32) -> Option<&Variable> {
         self.variables.get(usize::try_from(index).ok()?.checked_sub(1)?)
     }
 
-    /// The items of the declared type of an enumeration; of other variables none.
+    /// The items of an enumeration's declared type; empty for other variables.
     pub fn items(&self, variable: &Variable) -> &[EnumerationItem] {
         let name = variable.kind.declared_type();
         let declared = self.types.iter().find(|declared| Some(declared.name.as_str()) == name);

@@ -5,8 +5,8 @@ use std::io;
 
 /// An error in writing a description or an archive.
 ///
-/// The message names the field, its value and what would be allowed, for example
-/// `variables["x.v"].start is 11.0; allowed: 0.0 to 10.0`.
+/// The message names the field, its value and the allowed values, for example `variables["x.v"].start is
+/// 11.0; allowed: 0.0 to 10.0`.
 #[derive(Debug)]
 pub struct Error {
     kind: Box<Kind>,
@@ -47,7 +47,7 @@ impl Error {
         Self { kind: Box::new(Kind::Invalid { path, value, allowed }) }
     }
 
-    /// A rule of [`RULES`](crate::RULES) that is broken.
+    /// The error for a broken rule of [`RULES`](crate::RULES).
     pub(crate) fn rule(rule: &'static str, path: String, message: String) -> Self {
         Self { kind: Box::new(Kind::Rule { rule, path, message }) }
     }
@@ -61,14 +61,15 @@ impl Error {
         Self { kind: Box::new(Kind::Io { doing: doing.into(), source: source.into() }) }
     }
 
-    /// True if a field of the description or a path in the archive has a value that is not allowed.
-    /// [`path`](Self::path) and, if a rule of the standard is broken, [`broken_rule`](Self::broken_rule), else
-    /// [`value`](Self::value) and [`allowed`](Self::allowed) then say more.
+    /// True if a field of the description or a path in the archive has a forbidden value.
+    /// [`path`](Self::path) then gives the field. If a rule of the standard is broken,
+    /// [`broken_rule`](Self::broken_rule) gives it, otherwise [`value`](Self::value) and
+    /// [`allowed`](Self::allowed) give details.
     pub fn is_invalid(&self) -> bool {
         matches!(*self.kind, Kind::Invalid { .. } | Kind::Rule { .. })
     }
 
-    /// The name of the rule of [`RULES`](crate::RULES) that is broken.
+    /// The name of the broken rule of [`RULES`](crate::RULES).
     pub fn broken_rule(&self) -> Option<&'static str> {
         match *self.kind {
             Kind::Rule { rule, .. } => Some(rule),
@@ -81,7 +82,7 @@ impl Error {
         matches!(*self.kind, Kind::Io { .. })
     }
 
-    /// The field that is invalid, for example `variables["x.v"].start`.
+    /// The invalid field, for example `variables["x.v"].start`.
     pub fn path(&self) -> Option<&str> {
         match &*self.kind {
             Kind::Invalid { path, .. } | Kind::Rule { path, .. } => Some(path),
@@ -89,7 +90,7 @@ impl Error {
         }
     }
 
-    /// The value found there; texts are quoted, and an absent value reads `missing`.
+    /// The value found; texts are quoted, and an absent value reads `missing`.
     pub fn value(&self) -> Option<&str> {
         match &*self.kind {
             Kind::Invalid { value, .. } => Some(value),
@@ -97,7 +98,7 @@ impl Error {
         }
     }
 
-    /// The values that would be allowed there, in words.
+    /// A description of the allowed values.
     pub fn allowed(&self) -> Option<&str> {
         match &*self.kind {
             Kind::Invalid { allowed, .. } => Some(allowed),

@@ -1,15 +1,15 @@
-//! Model descriptions of FMI 2.0 co-simulation, with model exchange beside it or without, and of FMI 3.0 ([`fmi3`]) from
-//! typed variables, SSP system structures, and reproducible `.fmu` and `.ssp` archives.
+//! Model descriptions of FMI 2.0 co-simulation, with or without model exchange, and of FMI 3.0 ([`fmi3`]),
+//! made from typed variables. Also SSP system structures, and reproducible `.fmu` and `.ssp` archives.
 //!
-//! This crate owns the file `modelDescription.xml`, the zip container around it and the C types. It knows nothing
-//! of what the slave computes, reads no file and no environment variable and prints nothing.
+//! This crate owns the file `modelDescription.xml`, the zip container around it and the C types. It does not
+//! depend on what the slave computes, reads no file and no environment variable, and prints nothing.
 //!
-//! A [`ModelDescription`] is plain data with public fields: one model for code that writes a description, reads
-//! one or looks for defects in one. [`ModelDescription::to_xml`] checks it against the rules of the standard that an
-//! XML schema cannot express ([`RULES`]), then writes it. With the feature `read`, `Located` takes it from a
-//! file, however broken, with the positions of its parts, and tells which of the same rules it breaks. With the
-//! feature `archive` (on by default), `Archive` collects the files of an FMU and writes them so that the same
-//! entries always give the same bytes.
+//! A [`ModelDescription`] is plain data with public fields: one model for code that writes a description,
+//! reads one or looks for defects in one. [`ModelDescription::to_xml`] checks it against the rules of the
+//! standard that an XML schema cannot express ([`RULES`]), then writes it. With the feature `read`, `Located`
+//! reads it from a file, however broken, records the positions of its parts, and reports which of the same
+//! rules it breaks. With the feature `archive` (on by default), `Archive` collects the files of an FMU and
+//! writes them so that the same entries always give the same bytes.
 //!
 //! | module | owns |
 //! |---|---|

@@ -1,6 +1,6 @@
-//! Characters and forms that texts, identifiers and structured variable names may have.
+//! The characters and forms allowed in texts, identifiers and structured variable names.
 
-/// The first character that XML 1.0 cannot carry, not even escaped.
+/// The first character that XML 1.0 cannot represent, not even escaped.
 pub(crate) fn forbidden_character(text: &str) -> Option<char> {
     text.chars().find(|&c| match c {
         '\t' | '\n' | '\r' => false,
@@ -20,7 +20,7 @@ pub fn is_c_identifier(text: &str) -> bool {
     bytes.next().is_some_and(is_nondigit) && bytes.all(is_word)
 }
 
-/// Whether a text is a name of the structured convention (FMI 2.0.4, section 2.2.9):
+/// Whether a text is a name in the structured convention (FMI 2.0.4, section 2.2.9):
 ///
 /// ```text
 /// name            = identifier | "der(" identifier [ "," unsignedInteger ] ")"
@@ -34,7 +34,7 @@ pub fn is_structured_name(text: &str) -> bool {
     whole(identifier(text.as_bytes())) || whole(derivative(text.as_bytes()))
 }
 
-// Each of these takes one production from the front and gives the rest, or `None` if it does not match.
+// Each of these consumes one production from the front and returns the rest, or `None` if it does not match.
 
 fn derivative(text: &[u8]) -> Option<&[u8]> {
     let rest = identifier(text.strip_prefix(b"der(")?)?;
@@ -79,7 +79,7 @@ fn q_name(mut text: &[u8]) -> Option<&[u8]> {
     }
 }
 
-/// Optional: a text that does not begin with a bracket is left as it is.
+/// Optional: a text that does not begin with a bracket is returned unchanged.
 fn array_indices(text: &[u8]) -> Option<&[u8]> {
     let Some(mut text) = text.strip_prefix(b"[") else { return Some(text) };
     loop {
@@ -104,7 +104,7 @@ fn is_word(byte: u8) -> bool {
     is_nondigit(byte) || byte.is_ascii_digit()
 }
 
-/// The folder of this platform's binaries inside an FMI 2.0 archive (section 2.3), such as `linux64`.
+/// The folder of this platform's binaries in an archive of FMI 2.0 (section 2.3), such as `linux64`.
 pub const PLATFORM: &str = if cfg!(all(target_os = "windows", target_arch = "x86_64")) {
     "win64"
 } else if cfg!(all(target_os = "windows", target_arch = "x86")) {

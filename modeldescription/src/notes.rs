@@ -1,5 +1,5 @@
-//! What reading leaves beside the model: the positions of its parts, and the values that could not be read. The
-//! parts that both versions of the standard write alike are read here.
+//! What reading records besides the model: the positions of its parts, and the values that could not be
+//! read. The parts that both versions of the standard write alike are read here.
 
 use crate::rules::{Place, UnknownList, Unread};
 use crate::xsd::{boolean, double, int, unsigned, words};
@@ -7,7 +7,7 @@ use crate::{BaseUnit, DefaultExperiment, DisplayUnit, LogCategory, Unit};
 use roxmltree::Node;
 use std::collections::HashMap;
 
-/// Positions of parts in the text, and attributes that have no value of their type.
+/// Positions of parts in the text, and attributes without a value of their type.
 #[derive(Debug, Default)]
 pub(crate) struct Notes {
     pub(crate) positions: HashMap<Place, usize>,
@@ -15,8 +15,8 @@ pub(crate) struct Notes {
 }
 
 impl Notes {
-    /// The beginning of a part, in bytes from the beginning of the text. For a part that is not there, it is the
-    /// beginning of the part that should have it.
+    /// The offset of a part in the text, in bytes. If the part is missing, the
+    /// offset of the part that should contain it.
     pub(crate) fn position(&self, place: Place) -> usize {
         let outer = match place {
             Place::Start(v) => Place::Variable(v),
@@ -25,12 +25,12 @@ impl Notes {
         [place, outer].iter().find_map(|place| self.positions.get(place)).copied().unwrap_or(0)
     }
 
-    /// Whether an attribute that must be there is missing, or one that is there is no value of its type.
+    /// Whether a required attribute is missing, or a present one is not a value of its type.
     pub(crate) fn is_unread(&self, place: Place, attribute: &'static str) -> bool {
         self.unread.contains(&(place, attribute))
     }
 
-    /// Notes that an attribute is missing or no value of its type.
+    /// Notes that an attribute is missing or not a value of its type.
     pub(crate) fn miss(&mut self, place: Place, attribute: &'static str) {
         self.unread.insert((place, attribute));
     }
@@ -46,18 +46,18 @@ impl Notes {
         self.at(place, Some(node))
     }
 
-    /// The same for a place that has its position already, and an element that may be missing.
+    /// The same for a place that already has a position, and an element that may be missing.
     pub(crate) fn at<'r, 'n, 'i>(&'r mut self, place: Place, node: Option<Node<'n, 'i>>) -> At<'r, 'n, 'i> {
         At { notes: self, place, node }
     }
 
-    /// Notes the position of an interface, which is that of the name of its libraries.
+    /// Notes the position of an interface, which is also that of its model identifier.
     pub(crate) fn interface(&mut self, place: Place, node: Node<'_, '_>) {
         let at = node.attribute_node("modelIdentifier").map_or(node.range().start, |a| a.range().start);
         self.mark(place, at);
     }
 
-    /// The units.
+    /// Reads the units.
     pub(crate) fn units(&mut self, root: Node<'_, '_>) -> Vec<Unit> {
         list(root, "UnitDefinitions", "Unit").enumerate().map(|(u, node)| self.unit(u, node)).collect()
     }
@@ -83,7 +83,7 @@ impl Notes {
                 offset: at.value("offset", double).unwrap_or(0.0),
             }
         });
-        // A display unit without a name has nobody to refer to it.
+        // Nothing can refer to a display unit without a name.
         let named = children(node, "DisplayUnit").filter(|n| n.has_attribute("name"));
         let display = named.enumerate().map(|(d, node)| {
             let mut at = self.enter(Place::DisplayUnit(u, d), node);
@@ -97,7 +97,7 @@ impl Notes {
         Unit { name, base, display_units: display.collect() }
     }
 
-    /// The log categories.
+    /// Reads the log categories.
     pub(crate) fn categories(&mut self, root: Node<'_, '_>) -> Vec<LogCategory> {
         let category = |(c, node)| {
             let at = self.enter(Place::Category(c), node);
@@ -106,7 +106,7 @@ impl Notes {
         list(root, "LogCategories", "Category").enumerate().map(category).collect()
     }
 
-    /// The experiment.
+    /// Reads the default experiment.
     pub(crate) fn experiment(&mut self, root: Node<'_, '_>) -> Option<DefaultExperiment> {
         let node = children(root, "DefaultExperiment").next()?;
         let mut at = self.enter(Place::Experiment, node);
@@ -118,7 +118,7 @@ impl Notes {
         })
     }
 
-    /// A variable that is computed: the number in the attribute `key`, its dependencies, and their kinds.
+    /// Reads a computed variable: the number in the attribute `key`, its dependencies, and their kinds.
     pub(crate) fn unknown(
         &mut self,
         place: Place,
@@ -126,7 +126,7 @@ impl Notes {
         key: &'static str,
     ) -> (u32, Option<Vec<u32>>, Option<Vec<String>>) {
         let number = self.enter(place, node).required(key, unsigned);
-        // Each word counts, even one that is no number.
+        // Each word counts, even if it is not a number.
         let dependencies = node.attribute("dependencies").map(|text| {
             let number = |word| {
                 unsigned(word).unwrap_or_else(|| {
@@ -140,8 +140,8 @@ impl Notes {
         (number, dependencies, kinds.map(|text| words(text).map(str::to_owned).collect()))
     }
 
-    /// Notes the position of a list of the structure: of its first element that is there, or of what should have
-    /// it.
+    /// Notes the position of a list of the structure: that of its first element, or of the part that should
+    /// contain it.
     pub(crate) fn list_at(
         &mut self,
         list: UnknownList,
@@ -158,7 +158,7 @@ pub(crate) fn children<'n, 'i>(node: Node<'n, 'i>, name: &'static str) -> impl I
     node.children().filter(move |n| n.has_tag_name(name))
 }
 
-/// The children of this name of those of the outer name.
+/// The children with this name of the children with the outer name.
 pub(crate) fn list<'n, 'i>(
     root: Node<'n, 'i>,
     outer: &'static str,
@@ -167,7 +167,7 @@ pub(crate) fn list<'n, 'i>(
     children(root, outer).flat_map(move |n| children(n, inner))
 }
 
-/// The attributes of an element, if it is there.
+/// The attributes of an element, if it exists.
 pub(crate) struct At<'r, 'n, 'i> {
     pub(crate) notes: &'r mut Notes,
     pub(crate) place: Place,
@@ -179,7 +179,7 @@ impl<'n> At<'_, 'n, '_> {
         self.node?.attribute(name)
     }
 
-    /// Reads a value; one that cannot be read is noted.
+    /// Reads a value; if it cannot be read, this is noted.
     pub(crate) fn value<T>(
         &mut self,
         name: &'static str,
@@ -193,7 +193,7 @@ impl<'n> At<'_, 'n, '_> {
         value
     }
 
-    /// Reads a value that must be there; one that is missing is noted too.
+    /// Reads a required value; if it is missing, this is noted too.
     pub(crate) fn required<T: Default>(
         &mut self,
         name: &'static str,

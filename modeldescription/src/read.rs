@@ -1,8 +1,8 @@
-//! Reads a model description from its XML, whatever is wrong with it.
+//! Reads a model description from its XML, tolerating defects.
 //!
-//! Nothing is refused here. A value that is missing, or is none of its type, is absent or at its default in the
-//! model. It is also noted, so that no rule takes it for the file's own. Elements and attributes that the model
-//! has no field for are passed over, since a check against the schema finds those.
+//! Nothing is refused here. A value that is missing or not of its type is absent or has its default in the
+//! model. It is also noted, so that no rule mistakes it for a value of the file. Elements and attributes
+//! without a field in the model are skipped, since a check against the schema finds them.
 
 use crate::notes::{At, Notes, children, list};
 use crate::rules::{Check, Place, UnknownList, Violation, fmi2};
@@ -16,14 +16,14 @@ use roxmltree::{Document, Node};
 
 /// A model description, and the positions of its parts in the text.
 ///
-/// The dependencies of variables stay `None`: they are in the structure.
+/// The dependencies of variables stay `None`, since they are in the structure.
 #[derive(Debug, Default)]
 pub struct Located {
-    /// The content. Without a co-simulation interface that part is empty.
+    /// The content. Without a co-simulation interface, `co_simulation` is empty.
     pub description: ModelDescription,
     /// Its `ModelStructure`.
     pub structure: ModelStructure,
-    /// Number of co-simulation interfaces; the model's is the first.
+    /// Number of co-simulation interfaces; the model contains the first.
     pub interfaces: usize,
     /// The start values of the variables as written.
     pub starts: Vec<Option<String>>,
@@ -38,29 +38,29 @@ impl Located {
         read
     }
 
-    /// The beginning of a part, in bytes from the beginning of the text. For a part that is not there, it is the
-    /// beginning of the part that should have it.
+    /// The offset of a part in the text, in bytes. If the part is missing, the
+    /// offset of the part that should contain it.
     pub fn position(&self, place: Place) -> usize {
         self.notes.position(place)
     }
 
-    /// Whether an attribute that must be there is missing, or one that is there is no value of its type.
+    /// Whether a required attribute is missing, or a present one is not a value of its type.
     pub fn is_unread(&self, place: Place, attribute: &'static str) -> bool {
         self.notes.is_unread(place, attribute)
     }
 
-    /// The co-simulation interface, if there is one.
+    /// The co-simulation interface, if any.
     pub fn co_simulation(&self) -> Option<&CoSimulation> {
         (self.interfaces > 0).then_some(&self.description.co_simulation)
     }
 
-    /// The name of the libraries, if one is given.
+    /// The model identifier, if given.
     pub fn model_identifier(&self) -> Option<&str> {
         let given = !self.is_unread(Place::Interface(0), "modelIdentifier");
         given.then_some(&self.description.co_simulation.model_identifier)
     }
 
-    /// Tells every rule of [`RULES`](crate::RULES) that is broken, in their order.
+    /// Reports every broken rule of [`RULES`](crate::RULES), in their order.
     pub fn check(&self, report: &mut dyn FnMut(Violation)) {
         let add = |place, message: &str| Violation {
             rule: "interface.co-simulation",
@@ -80,7 +80,7 @@ impl Located {
     }
 
     fn root(&mut self, root: Node<'_, '_>) {
-        // The root's own attributes.
+        // The attributes of the root.
         let mut at = self.notes.enter(Place::Root, root);
         let description = ModelDescription {
             model_name: at.text("modelName"),
@@ -100,7 +100,7 @@ impl Located {
         self.description = description;
         self.description.model_exchange =
             children(root, "ModelExchange").next().map(|node| self.exchange(node));
-        // The co-simulation interfaces; the first is the model's.
+        // The co-simulation interfaces; the model contains the first.
         let interfaces: Vec<_> = children(root, "CoSimulation").collect();
         self.interfaces = interfaces.len();
         if interfaces.is_empty() {
@@ -176,7 +176,7 @@ impl Located {
         if of.is_none() {
             self.notes.miss(place, "type");
         }
-        // An item without a value stands for nothing.
+        // An item without a value is skipped.
         let valued = of.into_iter().flat_map(|of| children(of, "Item"));
         let valued = valued.filter_map(|n| Some((n, n.attribute("value").and_then(int)?)));
         let items = valued.enumerate().map(|(i, (node, value))| {
@@ -187,7 +187,7 @@ impl Located {
         SimpleType { name, description, kind, items }
     }
 
-    /// The element with the type of a variable or declared type; without such an element it counts as Real.
+    /// The element with the type of a variable or declared type; without one, the type is Real.
     fn kind<'n, 'i>(&mut self, place: Place, node: Node<'n, 'i>) -> (VariableKind, Option<Node<'n, 'i>>) {
         let found = node.children().find_map(|n| {
             let of = ScalarType::ALL.iter().find(|of| n.has_tag_name(of.as_str()))?;
@@ -266,7 +266,7 @@ fn causality(word: &str) -> Option<Causality> {
 }
 
 impl At<'_, '_, '_> {
-    /// Reads the start value of a variable; one that cannot be read is noted as the variable's.
+    /// Reads the start value of a variable. If it cannot be read, this is noted for the variable.
     fn start<T>(&mut self, parse: impl FnOnce(&str) -> Option<T>) -> Option<T> {
         let Place::Variable(v) = self.place else { return None };
         self.notes.at(Place::Start(v), self.node).value("start", parse)

@@ -1,8 +1,8 @@
 //! `ModelStructure`: outputs and initial unknowns with their dependencies (FMI 2.0.4, section 2.2.8).
 //!
-//! Callers have value references, and give dependencies as such. The file wants the 1-based positions of the
-//! variables, ascending. A value reference is unique only within its base type. So the translation looks among
-//! the variables that may be there ("knowns"), and refuses a value reference that fits more than one.
+//! Callers have value references, and give dependencies as such. The file needs the 1-based positions of the
+//! variables, in ascending order. A value reference is unique only within its base type. So the translation
+//! searches the variables that may be dependencies ("knowns"), and refuses an ambiguous value reference.
 
 use crate::variable::variable_path;
 use crate::{Causality, Error, Initial, ModelDescription, Variability, Variable};
@@ -11,7 +11,7 @@ use std::collections::{BTreeSet, HashMap};
 
 /// The content of `ModelStructure`.
 ///
-/// In a description to be written, dependencies come with the variables, and the lists follow from them
+/// In a description to be written, dependencies are given with the variables, and the lists follow from them
 /// ([`ModelDescription::structure`]). A description that was read has the lists of its file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ModelStructure {
@@ -20,20 +20,20 @@ pub struct ModelStructure {
     /// The derivatives of continuous states.
     pub derivatives: Vec<Unknown>,
     /// The unknowns of initialization: outputs that are not exact, calculated parameters, and states and
-    /// derivatives computed then. In ascending order of index.
+    /// derivatives computed during initialization. In ascending order of index.
     pub initial_unknowns: Vec<Unknown>,
 }
 
-/// A variable that is computed and its dependencies, as indices of variables, from 1.
+/// A computed variable and its dependencies, as indices of variables, from 1.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Unknown {
     /// The index of the variable.
     #[serde(rename = "@index")]
     pub index: u32,
-    /// The indices of its dependencies; `None` (the attribute is absent) means everything, empty nothing.
+    /// The indices of its dependencies. `None` (the attribute is absent) means all, empty means none.
     #[serde(rename = "@dependencies", skip_serializing_if = "Option::is_none")]
     pub dependencies: Option<Vec<u32>>,
-    /// The kind of each dependency, in the words of the standard; `None`: nothing is said.
+    /// The kind of each dependency, in the terms of the standard, if declared.
     #[serde(rename = "@dependenciesKind", skip_serializing_if = "Option::is_none")]
     pub dependency_kinds: Option<Vec<String>>,
 }
@@ -95,8 +95,8 @@ impl ModelDescription {
         Ok(structure)
     }
 
-    /// The positions of the derivatives of continuous states, which only model exchange makes known: variables with
-    /// `derivative`, unless they or the states are inputs.
+    /// The positions of the derivatives of continuous states, which only model exchange makes visible:
+    /// variables with `derivative`, unless they or their states are inputs.
     pub(crate) fn derivatives(&self) -> Vec<usize> {
         let is_flow = |v: &Variable| v.causality == Causality::Input;
         let is_derivative = |v: &Variable| {
@@ -110,8 +110,9 @@ impl ModelDescription {
     }
 }
 
-/// The indices of the unknowns of initialization: outputs that are computed then, calculated parameters, and of the
-/// derivatives with the indices `derivatives` those that are computed then, and their states.
+/// The indices of the unknowns of initialization: outputs computed during initialization, calculated
+/// parameters, and those of the derivatives with indices `derivatives`, and of their states, that are
+/// computed then.
 pub(crate) fn initial_unknowns(
     description: &ModelDescription,
     derivatives: impl Iterator<Item = u32>,
@@ -131,7 +132,7 @@ fn is_known(variable: &Variable) -> bool {
     matches!(variable.causality, Causality::Input | Causality::Parameter | Causality::Independent)
 }
 
-/// From value reference to the positions of the knowns that have it.
+/// Maps a value reference to the positions of the knowns that have it.
 struct Knowns<'a> {
     variables: &'a [Variable],
     positions: HashMap<u32, Vec<usize>>,

@@ -1,6 +1,6 @@
-//! System Structure and Parameterization 1.0 and 2.0: components, their connectors and connections as
-//! `SystemStructure.ssd`, start values as an `.ssv` parameter set. Both versions have the same namespaces; 2.0 has arrays
-//! and the number types of FMI 3.0.
+//! System Structure and Parameterization 1.0 and 2.0. Components, their connectors and connections go to
+//! `SystemStructure.ssd`, start values to an `.ssv` parameter set. Both versions have the same namespaces;
+//! 2.0 has arrays and the number types of FMI 3.0.
 
 use crate::fmi3::DataType;
 use crate::names::forbidden_character;
@@ -17,10 +17,10 @@ const SSV: &str = "http://ssp-standard.org/SSP1/SystemStructureParameterValues";
 /// A version of SSP.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum SspVersion {
-    /// 1.0: scalars, numbers of 32-bit integers or doubles.
+    /// 1.0: scalars, with numbers that are doubles or 32-bit integers.
     #[default]
     One,
-    /// 2.0: arrays too, and numbers of every type of FMI 3.0.
+    /// 2.0: also arrays, and all number types of FMI 3.0.
     Two,
 }
 
@@ -33,12 +33,12 @@ pub struct SystemStructure {
     pub version: SspVersion,
     /// The name of the system; not empty.
     pub name: String,
-    /// Meaning for a human; empty: the attribute is absent.
+    /// Its meaning, as a text for the reader; if empty, the attribute is omitted.
     pub description: String,
-    /// The tool that writes it; empty: the attribute is absent.
+    /// The tool that writes it; if empty, the attribute is omitted.
     pub generation_tool: String,
-    /// The path in the archive of the parameter set that gives start values, if there is one. Names in it
-    /// are `component.variable`.
+    /// The path in the archive of the parameter set with the start values, if there is one. Names in it are
+    /// `component.variable`.
     pub start_values: Option<String>,
     /// The components.
     pub components: Vec<SystemComponent>,
@@ -46,7 +46,7 @@ pub struct SystemStructure {
     pub connections: Vec<SystemConnection>,
     /// The enumerations that connectors refer to.
     pub enumerations: Vec<SimpleType>,
-    /// Start time (0 if not given) and stop time; the step size has no place in the format.
+    /// Start time (0 if omitted) and stop time. The format has no step size.
     pub default_experiment: Option<DefaultExperiment>,
 }
 
@@ -57,7 +57,7 @@ pub struct SystemComponent {
     pub name: String,
     /// The path of its FMU in the archive; a relative URI.
     pub source: String,
-    /// The variables that can be seen from outside.
+    /// The variables that are visible from outside.
     pub connectors: Vec<Connector>,
 }
 
@@ -68,16 +68,16 @@ pub struct Connector {
     pub name: String,
     /// Input, output, parameter or calculated parameter; others cannot be connectors.
     pub causality: Causality,
-    /// Its type, an enumeration with the name of one of the system as its declared type. Start value, range and
+    /// Its type. An enumeration declares one of the system's enumerations by name. Start value, range and
     /// unit are not written.
     pub kind: VariableKind,
-    /// The type of a number in FMI 3.0, where Real (a Float64) or Integer (an Int32) is another. In SSP 2.0 only.
+    /// The number type of FMI 3.0, if it is neither Real (a Float64) nor Integer (an Int32). Only in SSP 2.0.
     pub number: Option<DataType>,
-    /// The sizes of an array, each at least 1; empty: a scalar. In SSP 2.0 only.
+    /// The sizes of an array, each at least 1; empty for a scalar. Only in SSP 2.0.
     pub dimensions: Vec<u64>,
 }
 
-/// A signal from an output to an input: `end = factor · start + offset`, without conversion of units.
+/// A signal from an output to an input: `end = factor · start + offset`, without unit conversion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SystemConnection {
     /// Component and variable of the output.
@@ -108,27 +108,27 @@ pub struct Parameter {
     pub name: String,
     /// Its value.
     pub value: ParameterValue,
-    /// The type of a number, as [`Connector::number`] has it.
+    /// The type of a number, as in [`Connector::number`].
     pub number: Option<DataType>,
-    /// The sizes of an array, each at least 1; empty: a scalar. In SSP 2.0 only.
+    /// The sizes of an array, each at least 1; empty for a scalar. Only in SSP 2.0.
     pub dimensions: Vec<u64>,
 }
 
 impl Parameter {
-    /// A scalar, a number as a double or an integer of 32 bits.
+    /// A scalar; a number is a double or a 32-bit integer.
     pub fn scalar(name: impl Into<String>, value: ParameterValue) -> Self {
         Self { name: name.into(), value, number: None, dimensions: Vec::new() }
     }
 }
 
-/// A value of a [`Parameter`]. Lists are those of arrays, row by row.
+/// A value of a [`Parameter`]. Lists hold arrays, row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ParameterValue {
     /// A finite double, in the unit of the variable.
     Real(f64),
     /// An integer, within the limits of its type.
     Integer(i64),
-    /// A truth value.
+    /// A Boolean.
     Boolean(bool),
     /// A text.
     String(String),
@@ -136,14 +136,14 @@ pub enum ParameterValue {
     Enumeration(String),
     /// Finite doubles.
     Reals(Vec<f64>),
-    /// Integers, each within the limits of their type.
+    /// Integers, each within the limits of its type.
     Integers(Vec<i64>),
-    /// Truth values.
+    /// Booleans.
     Booleans(Vec<bool>),
 }
 
 impl ParameterValue {
-    /// The number of elements of a list.
+    /// The number of elements, if it is a list.
     fn len(&self) -> Option<usize> {
         match self {
             Self::Reals(list) => Some(list.len()),
@@ -168,9 +168,9 @@ impl SystemStructure {
     ///
     /// # Errors
     ///
-    /// Names that are empty, used twice or have characters that XML cannot carry; a connection from or to
-    /// a connector that does not exist or is not an output or input; a factor that is not finite; a
-    /// connector of another causality; an enumeration that is not declared.
+    /// Names that are empty, duplicated or have characters that XML cannot represent; a connection from or to
+    /// a connector that does not exist or is not an output or input; a factor that is not finite; a connector
+    /// of another causality; an undeclared enumeration.
     pub fn to_xml(&self) -> Result<String, Error> {
         self.validate()?;
         text(&SsdRoot::new(self))
@@ -231,7 +231,7 @@ impl ParameterSet {
     ///
     /// # Errors
     ///
-    /// Names that are empty, used twice or have characters that XML cannot carry; a number that is not
+    /// Names that are empty, duplicated or have characters that XML cannot represent; a number that is not
     /// finite.
     pub fn to_xml(&self) -> Result<String, Error> {
         named("name", &self.name)?;
@@ -311,7 +311,7 @@ fn sized(path: &str, version: SspVersion, sizes: &[u64]) -> Result<(), Error> {
     }
 }
 
-/// The type of a number, which is a float, an integer or none.
+/// The type of a number: a float, an integer or neither.
 fn typed(
     path: &str,
     version: SspVersion,
@@ -341,7 +341,7 @@ fn kind(causality: Causality) -> Option<&'static str> {
     }
 }
 
-/// An element of a type, as both files have it; the empty ones have no attributes at all.
+/// The element of a type in both files. Elements without content have no attributes at all.
 #[derive(Serialize)]
 struct Empty {}
 
@@ -430,7 +430,7 @@ struct ConnectorElement<'a> {
     content: Vec<TypeElement<'a>>,
 }
 
-/// The type of a connector, or after it the size of a dimension.
+/// The type of a connector, or following it the size of a dimension.
 enum TypeElement<'a> {
     Plain(&'static str),
     Enumeration(Named<'a>),
@@ -515,7 +515,7 @@ struct EnumerationElement<'a> {
     items: Vec<ItemElement<'a>>,
 }
 
-// Not the model's own item: the format gives it no description.
+// Differs from the model's own item, since the format has no description for it.
 #[derive(Serialize)]
 struct ItemElement<'a> {
     #[serde(rename = "@name")]
@@ -561,7 +561,7 @@ struct ParameterElement<'a> {
     content: Vec<ValueElement<'a>>,
 }
 
-/// The value of a parameter, or after it the size of a dimension.
+/// The value of a parameter, or following it the size of a dimension.
 enum ValueElement<'a> {
     Value(&'static str, &'a ParameterValue),
     Dimension(Size),
@@ -621,7 +621,7 @@ struct Tags {
     boolean: &'static str,
     string: &'static str,
     enumeration: &'static str,
-    /// Those of FMI 3.0.
+    /// The number types of FMI 3.0.
     numbers: [(DataType, &'static str); 10],
 }
 
@@ -649,13 +649,13 @@ macro_rules! tags {
     };
 }
 
-/// Those of connectors.
+/// The elements for connectors.
 const TYPES: Tags = tags!("ssc");
-/// Those of values.
+/// The elements for values.
 const VALUES: Tags = tags!("ssv");
 
 impl Tags {
-    /// The element of this type of numbers, or else the plain one.
+    /// The element of this number type, or the plain one if there is none.
     fn number(&self, of: Option<DataType>, plain: &'static str) -> &'static str {
         let found = self.numbers.iter().find(|(number, _)| Some(*number) == of);
         found.map_or(plain, |(_, tag)| tag)

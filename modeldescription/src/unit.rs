@@ -8,18 +8,18 @@ use serde::Serialize;
 /// A value `x` in this unit is `factor * x + offset` in the SI base units with the exponents of `base`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Unit {
-    /// The name, as variables spell it, for example `m/s`. Not empty, unique among the units, one line.
+    /// The name that variables use, for example `m/s`. Not empty, unique among the units, one line.
     #[serde(rename = "@name")]
     pub name: String,
-    /// Definition in SI base units; absent: nothing is said.
+    /// Its definition in SI base units, if given.
     #[serde(rename = "BaseUnit", skip_serializing_if = "Option::is_none")]
     pub base: Option<BaseUnit>,
-    /// Units to show values in.
+    /// Units for display.
     #[serde(rename = "DisplayUnit", skip_serializing_if = "Vec::is_empty")]
     pub display_units: Vec<DisplayUnit>,
 }
 
-/// A unit to show values in: `x` of the unit is shown as `factor * x + offset`, or as `factor / x` if `inverse`.
+/// A unit for display: `x` of the unit is shown as `factor * x + offset`, or as `factor / x` if `inverse`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DisplayUnit {
     /// The name, for example `deg`; unique among the display units of the unit, not empty, one line.
@@ -31,8 +31,8 @@ pub struct DisplayUnit {
     /// Value in display units at 0 of the unit; finite, default 0.
     #[serde(rename = "@offset", skip_serializing_if = "xsd::is_default", serialize_with = "xsd::number")]
     pub offset: f64,
-    /// The unit is the inverse, such as litres per kilometre of kilometres per litre; without offset, default false.
-    /// FMI 2.0 has no such units.
+    /// Whether the display unit is the inverse, such as litres per kilometre for kilometres per litre;
+    /// without offset, default false. FMI 2.0 has no such units.
     #[serde(rename = "@inverse", skip_serializing_if = "xsd::is_default")]
     pub inverse: bool,
 }

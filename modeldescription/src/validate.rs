@@ -1,8 +1,7 @@
-//! Conditions on a description to be written: the rules of the standard ([`rules`](crate::rules)), those of the
-//! XML schema, and a few of our own, such as that no two variables are the same memory.
+//! Conditions on a description to be written: the rules of the standard ([`rules`](crate::rules)), those of
+//! the XML schema, and a few of our own, such as that no two variables share their memory.
 //!
-//! The first violation found is reported. Dependencies are checked where they are translated, in
-//! `structure`.
+//! The first violation found is reported. Dependencies are checked when they are translated, in `structure`.
 
 use crate::calendar::is_utc_instant;
 use crate::names::{forbidden_character, is_one_line};
@@ -21,17 +20,17 @@ impl ModelDescription {
     /// # Errors
     ///
     /// - A rule of [`RULES`](crate::RULES) on descriptions is broken.
-    /// - A required text is empty, a text has a character that XML 1.0 cannot carry, or a text of one
+    /// - A required text is empty, a text has a character that XML 1.0 cannot represent, or a text of one
     ///   line has a line break or tab.
-    /// - A date is not in UTC, a factor of a base unit or a nominal value not positive, a bound NaN or infinite on the
-    ///   wrong side, a start value infinite without such a bound.
+    /// - A date is not in UTC; a factor of a base unit or a nominal value is not positive; a bound is NaN or
+    ///   infinite on the wrong side; a start value is infinite without such a bound.
     /// - Value references of one base type are not unique.
     /// - There is no variable, or an enumeration has no items or no type.
     /// - A dependency does not exist.
     pub fn validate(&self) -> Result<(), Error> {
         let mut broken = None;
         let mut report = |violation: Violation| {
-            // Aliases are refused altogether, in the check below. A step may be longer than the experiment.
+            // The check below refuses all aliases. A step may be longer than the experiment.
             if !(violation.rule.starts_with("variable.alias") || violation.rule == "experiment.step") {
                 broken.get_or_insert(violation);
             }
@@ -60,14 +59,14 @@ impl ModelDescription {
     }
 }
 
-/// The names that paths of places are made of.
+/// The names that the paths of places contain.
 pub(crate) struct Paths<'a> {
-    /// The interfaces; the last stands for all after it.
+    /// The interfaces; the last one applies to all further ones.
     pub(crate) interfaces: &'a [&'a str],
     pub(crate) units: &'a [Unit],
-    /// The name of the declared type at a position.
+    /// The name of the declared type at an index.
     pub(crate) of_type: &'a dyn Fn(usize) -> &'a str,
-    /// The name of the variable at a position.
+    /// The name of the variable at an index.
     pub(crate) of_variable: &'a dyn Fn(usize) -> &'a str,
 }
 
@@ -100,7 +99,7 @@ impl Paths<'_> {
     }
 }
 
-/// Checks the texts of the root; `token` is the path of the one that ties description and library together.
+/// Checks the texts of the root; `token` is the path of the text that links description and library.
 pub(crate) fn header(token: &str, header: &Header<'_>) -> Result<(), Error> {
     required("model_name", header.model_name)?;
     line(token, header.token.1)?;
@@ -131,7 +130,7 @@ fn source_files(description: &ModelDescription) -> Result<(), Error> {
     Ok(())
 }
 
-/// Checks names and scales of units.
+/// Checks the names and scales of units.
 pub(crate) fn units(units: &[Unit]) -> Result<(), Error> {
     for (u, unit) in units.iter().enumerate() {
         name(format!("units[{u}].name"), &unit.name)?;
@@ -175,7 +174,7 @@ fn types(description: &ModelDescription) -> Result<(), Error> {
     Ok(())
 }
 
-/// Checks the items of a declared type, which only an enumeration has.
+/// Checks the items of a declared type; only an enumeration has any.
 pub(crate) fn items<V>(
     path: &impl Fn(&str) -> String,
     is_enumeration: bool,
@@ -218,7 +217,7 @@ fn variables(description: &ModelDescription) -> Result<(), Error> {
     Ok(())
 }
 
-/// Checks bounds, start value and texts, which depend on the type.
+/// Checks the type-specific bounds, start value and texts.
 fn kind(path: &impl Fn(&str) -> String, kind: &VariableKind) -> Result<(), Error> {
     match kind {
         VariableKind::Real(Real { quantity, min, max, nominal, start, .. }) => {
@@ -272,7 +271,7 @@ fn finite(path: impl Into<String>, value: f64) -> Result<(), Error> {
     if value.is_finite() { Ok(()) } else { Err(Error::invalid(path, Number(value), "finite")) }
 }
 
-/// Checks a name: not empty, one line.
+/// Checks that a name is not empty and has one line.
 pub(crate) fn name(path: String, name: &str) -> Result<(), Error> {
     required(path.as_str(), name)?;
     line(path, name)

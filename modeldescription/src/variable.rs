@@ -7,19 +7,19 @@ use serde::Serialize;
 /// The role of a variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Causality {
-    /// Set by the importer before the simulation, or also during it if tunable.
+    /// Set by the importer before the simulation; if tunable, also during it.
     Parameter,
     /// Computed from parameters.
     CalculatedParameter,
     /// Set by the importer or by another slave.
     Input,
-    /// Given to the importer or to another slave.
+    /// Read by the importer or another slave.
     Output,
-    /// Inside the slave, but visible.
+    /// Internal to the slave, but visible.
     Local,
-    /// The independent variable, usually time. At most one, Real and without start value.
+    /// The independent variable, usually time. At most one, which is Real and has no start value.
     Independent,
-    /// Set by the importer before initialization; can be the size of arrays. In FMI 3.0 only.
+    /// Set by the importer before initialization; can determine array sizes. Only in FMI 3.0.
     StructuralParameter,
 }
 
@@ -27,11 +27,11 @@ words!(Causality: Parameter "parameter", CalculatedParameter "calculatedParamete
     Local "local", Independent "independent", StructuralParameter "structuralParameter");
 
 impl Causality {
-    /// The spellings that FMI 2.0 has.
+    /// The names in FMI 2.0.
     pub const WORDS_OF_FMI2: &'static [&'static str] = Self::WORDS.split_at(6).0;
 }
 
-/// The instants at which a variable may change.
+/// When the value of a variable may change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Variability {
     /// Never.
@@ -40,39 +40,39 @@ pub enum Variability {
     Fixed,
     /// Between communication points, when the importer sets it.
     Tunable,
-    /// At communication points and events only.
+    /// Only at communication points and events.
     Discrete,
-    /// At any time. Real variables only.
+    /// At any time. Only Real variables.
     Continuous,
 }
 
 words!(Variability: Constant "constant", Fixed "fixed", Tunable "tunable", Discrete "discrete",
     Continuous "continuous");
 
-/// The origin of a variable's first value.
+/// How the first value of a variable is determined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Initial {
     /// From its start value.
     Exact,
-    /// Computed in initialization, with the start value as first guess.
+    /// Computed during initialization, with the start value as initial guess.
     Approx,
-    /// Computed in initialization; there is no start value.
+    /// Computed during initialization, without a start value.
     Calculated,
 }
 
 words!(Initial: Exact "exact", Approx "approx", Calculated "calculated");
 
-/// The rule of the standard on [`Initial`] for one pair of causality and variability.
+/// The rule of the standard on [`Initial`] for a pair of causality and variability.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InitialRule {
-    /// The meaning of an absent `initial`; `None` where the attribute itself is forbidden.
+    /// The meaning of an omitted `initial`; `None` if the attribute itself is forbidden.
     pub default: Option<Initial>,
-    /// The values that may be written; empty where the attribute itself is forbidden.
+    /// The values allowed; empty if the attribute itself is forbidden.
     pub allowed: &'static [Initial],
 }
 
 impl InitialRule {
-    /// The rule for a pair, or `None` if the pair is not a legal one.
+    /// The rule for a pair, or `None` if the pair is not legal.
     ///
     /// | variability | parameter | calculatedParameter | input | output | local | independent |
     /// |---|---|---|---|---|---|---|
@@ -82,9 +82,8 @@ impl InitialRule {
     /// | discrete   | - | - | D | C | C | - |
     /// | continuous | - | - | D | C | C | E |
     ///
-    /// A: exact. B: calculated (default) or approx. C: calculated (default), exact or approx.
-    /// D and E: the attribute is forbidden; inputs have a start value nevertheless, the independent
-    /// variable has none.
+    /// A: exact. B: calculated (default) or approx. C: calculated (default), exact or approx. D and E: the
+    /// attribute is forbidden. Inputs still have a start value; the independent variable has none.
     pub fn of(causality: Causality, variability: Variability) -> Option<Self> {
         use Causality as C;
         use Initial::{Approx, Calculated, Exact};
@@ -105,7 +104,7 @@ impl InitialRule {
         }
     }
 
-    /// The same for FMI 3.0. There structural parameters are as parameters, and inputs are exact.
+    /// The same for FMI 3.0, where structural parameters follow the rule of parameters, and inputs are exact.
     pub fn of_fmi3(causality: Causality, variability: Variability) -> Option<Self> {
         let exact = Self { default: Some(Initial::Exact), allowed: &[Initial::Exact] };
         match causality {
@@ -123,7 +122,7 @@ pub enum ScalarType {
     Real,
     /// A 32-bit integer.
     Integer,
-    /// A truth value.
+    /// A Boolean.
     Boolean,
     /// A text, UTF-8.
     String,
@@ -153,7 +152,7 @@ impl ScalarType {
 pub enum BaseType {
     /// `fmi2Real`, a double.
     Real,
-    /// `fmi2Integer`, 32 bits; also of enumerations.
+    /// `fmi2Integer`, 32 bits; also for enumerations.
     Integer,
     /// `fmi2Boolean`.
     Boolean,
@@ -161,11 +160,11 @@ pub enum BaseType {
     String,
 }
 
-/// The attributes of a Real. Of a declared type those of the variable alone (`declared_type`, `start`,
+/// The attributes of a Real. In a declared type, those specific to variables (`declared_type`, `start`,
 /// `derivative`) stay `None`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Real {
-    /// The name of the type that gives the attributes that are not given here; absent: none.
+    /// The name of the type that provides omitted attributes, if any.
     #[serde(rename = "@declaredType", skip_serializing_if = "Option::is_none")]
     pub declared_type: Option<String>,
     /// The physical quantity, for example `Acceleration`; one line.
@@ -177,20 +176,20 @@ pub struct Real {
     /// The name of one of the display units of `unit`.
     #[serde(rename = "@displayUnit", skip_serializing_if = "Option::is_none")]
     pub display_unit: Option<String>,
-    /// Offsets of units do not count, as in differences of temperature; default false.
+    /// Whether unit offsets are ignored, as for differences of temperature; default false.
     #[serde(rename = "@relativeQuantity", skip_serializing_if = "xsd::is_default")]
     pub relative_quantity: bool,
-    /// Smallest allowed value, in `unit`; not NaN and not `INF`; absent: no limit.
+    /// Smallest allowed value, in `unit`; not NaN and not `INF`; no limit if absent.
     #[serde(rename = "@min", skip_serializing_if = "Option::is_none", serialize_with = "xsd::optional")]
     pub min: Option<f64>,
-    /// Largest allowed value, in `unit`; at least `min`, not NaN and not `-INF`; absent: no limit.
+    /// Largest allowed value, in `unit`; at least `min`, not NaN and not `-INF`; no limit if absent.
     #[serde(rename = "@max", skip_serializing_if = "Option::is_none", serialize_with = "xsd::optional")]
     pub max: Option<f64>,
     /// Typical magnitude, in `unit`; finite and greater than 0.
     #[serde(rename = "@nominal", skip_serializing_if = "Option::is_none", serialize_with = "xsd::optional")]
     pub nominal: Option<f64>,
-    /// First value or first guess, in `unit`; within `min` and `max`. Finite, except that it may
-    /// be infinite where the bound on that side is given as infinite.
+    /// Start value or initial guess, in `unit`; within `min` and `max`. Finite, unless the bound on that side
+    /// is explicitly infinite.
     #[serde(rename = "@start", skip_serializing_if = "Option::is_none", serialize_with = "xsd::optional")]
     pub start: Option<f64>,
     /// The index, from 1, of the continuous variable that this is the time derivative of.
@@ -198,40 +197,41 @@ pub struct Real {
     pub derivative: Option<u32>,
 }
 
-/// The attributes of an Integer or an enumeration. Of a declared type those of the variable alone
+/// The attributes of an Integer or an enumeration. In a declared type, those specific to variables
 /// (`declared_type`, `start`) stay `None`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Integer {
-    /// The name of the type that gives the attributes that are not given here. An enumeration must have
-    /// one; for an Integer absent: none.
+    /// The name of the type that provides omitted attributes. Required for an enumeration, optional for an
+    /// Integer.
     #[serde(rename = "@declaredType", skip_serializing_if = "Option::is_none")]
     pub declared_type: Option<String>,
     /// The physical quantity; one line.
     #[serde(rename = "@quantity", skip_serializing_if = "Option::is_none")]
     pub quantity: Option<String>,
-    /// Smallest allowed value, dimensionless; absent: no limit.
+    /// Smallest allowed value, dimensionless; no limit if absent.
     #[serde(rename = "@min", skip_serializing_if = "Option::is_none")]
     pub min: Option<i32>,
-    /// Largest allowed value, at least `min`; absent: no limit.
+    /// Largest allowed value, at least `min`; no limit if absent.
     #[serde(rename = "@max", skip_serializing_if = "Option::is_none")]
     pub max: Option<i32>,
-    /// First value or first guess; within `min` and `max`; of an enumeration the value of one of its items.
+    /// Start value or initial guess; within `min` and `max`. For an enumeration, the value of one of its
+    /// items.
     #[serde(rename = "@start", skip_serializing_if = "Option::is_none")]
     pub start: Option<i32>,
 }
 
-/// The attributes of a Boolean or a text. Of a declared type both stay `None`.
+/// The attributes of a Boolean or a String. In a declared type, both stay `None`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Plain<T> {
-    /// The name of the declared type; absent: none.
+    /// The name of the declared type, if any.
     #[serde(rename = "@declaredType", skip_serializing_if = "Option::is_none")]
     pub declared_type: Option<String>,
-    /// First value or first guess; a text has characters that XML 1.0 allows.
+    /// Start value or initial guess; a text must consist of characters that XML 1.0 allows.
     #[serde(rename = "@start", skip_serializing_if = "Option::is_none")]
     pub start: Option<T>,
 }
 
-/// The type of a variable, or a declared type, with the attributes that depend on it.
+/// The type of a variable, or a declared type, with its type-specific attributes.
 ///
 /// `start` is required for inputs and for initial exact or approx, and forbidden otherwise.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -240,7 +240,7 @@ pub enum VariableKind {
     Real(Real),
     /// A 32-bit integer, dimensionless.
     Integer(Integer),
-    /// A truth value.
+    /// A Boolean.
     Boolean(Plain<bool>),
     /// A text.
     String(Plain<String>),
@@ -254,7 +254,7 @@ impl VariableKind {
         Self::Enumeration(Integer { declared_type: Some(declared_type.into()), ..Integer::default() })
     }
 
-    /// The type alone.
+    /// The type without its attributes.
     pub fn scalar_type(&self) -> ScalarType {
         match self {
             Self::Real(_) => ScalarType::Real,
@@ -280,17 +280,17 @@ impl VariableKind {
         declared_type.as_deref()
     }
 
-    /// The unit; of a Real only.
+    /// The unit; only of a Real.
     pub fn unit(&self) -> Option<&str> {
         if let Self::Real(real) = self { real.unit.as_deref() } else { None }
     }
 
-    /// The display unit; of a Real only.
+    /// The display unit; only of a Real.
     pub fn display_unit(&self) -> Option<&str> {
         if let Self::Real(real) = self { real.display_unit.as_deref() } else { None }
     }
 
-    /// `min` and `max` as numbers; of a Boolean or a text none.
+    /// `min` and `max` as numbers; `None` for a Boolean or a String.
     pub fn range(&self) -> (Option<f64>, Option<f64>) {
         match self {
             Self::Real(real) => (real.min, real.max),
@@ -307,7 +307,7 @@ impl VariableKind {
         }
     }
 
-    /// The start value as a number, of a Boolean 0 or 1; of a text none.
+    /// The start value as a number, 0 or 1 for a Boolean; `None` for a String.
     pub fn start_number(&self) -> Option<f64> {
         match self {
             Self::Real(real) => real.start,
@@ -321,33 +321,34 @@ impl VariableKind {
 /// One scalar variable of the slave.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variable {
-    /// The name; not empty, unique, different from all enumeration types, one line, and of the form
-    /// that the description's [`NamingConvention`](crate::NamingConvention) asks for.
+    /// The name; not empty, unique, different from all enumeration types, one line, and of the form that the
+    /// description's [`NamingConvention`](crate::NamingConvention) requires.
     pub name: String,
     /// The handle of the variable in the C interface; unique within its [`BaseType`].
     pub value_reference: u32,
-    /// Meaning for a human; empty: the attribute is absent.
+    /// Its meaning, as a text for the reader; if empty, the attribute is omitted.
     pub description: String,
     /// The role of the variable.
     pub causality: Causality,
-    /// The instants at which it may change; the pair with `causality` must be legal, see [`InitialRule::of`].
+    /// When its value may change; the pair with `causality` must be legal, see [`InitialRule::of`].
     pub variability: Variability,
-    /// The origin of its first value; `None`: the default of [`InitialRule::of`].
+    /// How its first value is determined; `None` means the default of [`InitialRule::of`].
     pub initial: Option<Initial>,
     /// Type, start value and range.
     pub kind: VariableKind,
-    /// Outputs, and with model exchange derivatives of states: value references of the inputs, parameters, independent
-    /// variable and, with model exchange, states that this one depends on directly at communication points. `None`: unknown, so on everything; empty: on nothing. Order and
-    /// repetition do not matter. A value reference that several of those variables have (of different base types)
-    /// is refused as ambiguous.
+    /// For outputs, and with model exchange derivatives of states: value references of the inputs,
+    /// parameters, independent variable and, with model exchange, states that this one depends on directly at
+    /// communication points. `None` means unknown, and so all; empty means none. Order and repetition do not
+    /// matter. A value reference shared by several of those variables (of different base types) is refused as
+    /// ambiguous.
     pub dependencies: Option<Vec<u32>>,
-    /// Initial unknowns only (see [`is_initial_unknown`](Self::is_initial_unknown)): the same for
-    /// initialization mode, where variables with initial exact count as well.
+    /// The same for initialization mode, where variables with initial exact count as well. Only for initial
+    /// unknowns (see [`is_initial_unknown`](Self::is_initial_unknown)).
     pub initial_dependencies: Option<Vec<u32>>,
 }
 
 impl Variable {
-    /// The index, from 1, of the variable that this one is the derivative of by time.
+    /// The index, from 1, of the variable whose time derivative this is.
     pub fn state(&self) -> Option<u32> {
         if let VariableKind::Real(Real { derivative, .. }) = self.kind { derivative } else { None }
     }
@@ -357,13 +358,13 @@ impl Variable {
         matches!(self.effective_initial(), Some(Initial::Approx | Initial::Calculated))
     }
 
-    /// The origin of the first value, with the default of the standard filled in. `None` for inputs, the
+    /// How the first value is determined, with the default of the standard filled in. `None` for inputs, the
     /// independent variable and illegal pairs of causality and variability.
     pub fn effective_initial(&self) -> Option<Initial> {
         self.initial.or_else(|| InitialRule::of(self.causality, self.variability)?.default)
     }
 
-    /// Whether a start value is required; where it is not, it is forbidden.
+    /// Whether a start value is required; otherwise it is forbidden.
     pub fn needs_start(&self) -> bool {
         self.causality == Causality::Input
             || matches!(self.effective_initial(), Some(Initial::Exact | Initial::Approx))

@@ -1,10 +1,10 @@
-//! One table for an enum and its words in the XML file, in both directions.
+//! Maps an enum to its words in the XML file and back, with one table.
 
-/// Gives an enum its words: `as_str`, `parse`, and the lists of all.
+/// Defines the words of an enum: `as_str`, `parse`, and lists of all values and words.
 macro_rules! words {
     ($type:ident: $($variant:ident $word:literal),+) => {
         impl $type {
-            /// All of them, in the order of the standard.
+            /// All values, in the order of the standard.
             pub const ALL: &'static [Self] = &[$(Self::$variant),+];
             /// Their spellings, in the same order.
             pub const WORDS: &'static [&'static str] = &[$($word),+];
@@ -14,7 +14,7 @@ macro_rules! words {
                 match self { $(Self::$variant => $word),+ }
             }
 
-            /// The one with this spelling.
+            /// The value with this spelling.
             pub fn parse(word: &str) -> Option<Self> {
                 Self::ALL.iter().copied().find(|value| value.as_str() == word)
             }

@@ -1,8 +1,8 @@
-//! The file `modelDescription.xml`. The model's own types say how each element is written. The rest is here:
-//! the root, the containers, and everything derived.
+//! Writes the file `modelDescription.xml`. The types of the model define how each element is written. The
+//! rest is here: the root, the containers, and everything derived.
 //!
-//! Attributes at the default of the schema are left out, except causality, variability and initial: a reader of
-//! the file should not have to know the table of defaults.
+//! Attributes at the schema's default are omitted, except causality, variability and initial, so that a
+//! reader of the file need not know the table of defaults.
 
 use crate::{
     DefaultExperiment, EnumerationItem, Error, LogCategory, ModelDescription, ModelStructure,
@@ -12,7 +12,7 @@ use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
 impl ModelDescription {
-    /// The content of `modelDescription.xml`: UTF-8 without byte order mark, two blanks of indentation.
+    /// The content of `modelDescription.xml`: UTF-8 without byte order mark, indented by two blanks.
     ///
     /// The same description always gives the same text.
     ///
@@ -41,7 +41,7 @@ impl ModelDescription {
     }
 }
 
-/// A document with this root: UTF-8 without byte order mark, two blanks of indentation.
+/// A document with this root: UTF-8 without byte order mark, indented by two blanks.
 pub(crate) fn text<T: Serialize>(root: &T) -> Result<String, Error> {
     let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
     let mut serializer = quick_xml::se::Serializer::new(&mut text);
@@ -51,17 +51,17 @@ pub(crate) fn text<T: Serialize>(root: &T) -> Result<String, Error> {
     Ok(text)
 }
 
-/// A container with its children, or none at all, since the schemas allow no empty containers.
+/// A container with its children, or nothing if there are none, since the schemas forbid empty containers.
 pub(crate) fn container<T, L: AsRef<[T]>, C>(children: L, container: impl FnOnce(L) -> C) -> Option<C> {
     (!children.as_ref().is_empty()).then(|| container(children))
 }
 
-/// The attributes of the root that both versions of the standard have.
+/// The attributes of the root that both versions of the standard share.
 pub(crate) struct Header<'a> {
     /// The value of `fmiVersion`.
     pub(crate) version: &'static str,
     pub(crate) model_name: &'a str,
-    /// Name and value of the attribute that ties description and library together.
+    /// Name and value of the attribute that links description and library.
     pub(crate) token: (&'static str, &'a str),
     pub(crate) description: &'a str,
     pub(crate) author: &'a str,
@@ -94,7 +94,7 @@ impl Header<'_> {
     }
 }
 
-/// Writes a field that is there.
+/// Writes a field if it is present.
 pub(crate) fn optional<E: SerializeStruct, T: Serialize>(
     element: &mut E,
     name: &'static str,
@@ -103,7 +103,7 @@ pub(crate) fn optional<E: SerializeStruct, T: Serialize>(
     value.map_or(Ok(()), |value| element.serialize_field(name, &value))
 }
 
-/// Writes a text that is not empty.
+/// Writes a text if it is not empty.
 pub(crate) fn unless_empty<E: SerializeStruct>(
     element: &mut E,
     name: &'static str,
@@ -112,7 +112,7 @@ pub(crate) fn unless_empty<E: SerializeStruct>(
     optional(element, name, (!value.is_empty()).then_some(value))
 }
 
-/// Writes a flag or number that is not at its default.
+/// Writes a flag or number unless it has its default.
 pub(crate) fn unless_default<E: SerializeStruct, T: Serialize + Default + PartialEq>(
     element: &mut E,
     name: &'static str,

@@ -1,6 +1,6 @@
 //! The simple types of XML Schema that the schemas of FMI use, written and read.
 //!
-//! Doubles are written so that they read back as exactly the same bits (NaN payloads aside).
+//! Doubles are written so that they read back with exactly the same bits (except for NaN payloads).
 
 use crate::calendar::days_in_month;
 use serde::{Serialize, Serializer};
@@ -17,7 +17,7 @@ impl fmt::Display for Number {
             x if x.is_nan() => f.write_str("NaN"),
             f64::INFINITY => f.write_str("INF"),
             f64::NEG_INFINITY => f.write_str("-INF"),
-            // `Debug` changes to an exponent where `Display` would print hundreds of zeros.
+            // `Debug` uses exponents where `Display` would print hundreds of zeros.
             x => write!(f, "{x:?}"),
         }
     }
@@ -29,12 +29,12 @@ impl Serialize for Number {
     }
 }
 
-/// Serialises a field with a number.
+/// Serialises a field that is a number.
 pub(crate) fn number<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
     Number(*value).serialize(serializer)
 }
 
-/// Serialises a field with a number that may be absent.
+/// Serialises a field that is an optional number.
 pub(crate) fn optional<S: Serializer>(value: &Option<f64>, serializer: S) -> Result<S::Ok, S::Error> {
     value.map(Number).serialize(serializer)
 }
@@ -49,7 +49,7 @@ pub(crate) fn is_one(value: &f64) -> bool {
     *value == 1.0
 }
 
-/// White space of XML, which is less than that of Unicode.
+/// White space in XML, which is a subset of that in Unicode.
 const BLANKS: [char; 4] = [' ', '\t', '\n', '\r'];
 
 fn trimmed(text: &str) -> &str {
@@ -87,7 +87,7 @@ pub fn unsigned(text: &str) -> Option<u32> {
 
 /// An `xs:float`, as a double.
 pub fn float(text: &str) -> Option<f64> {
-    // The digits are rounded once, to 32 bits.
+    // The digits are rounded only once, to 32 bits.
     double(text)?;
     trimmed(text).parse::<f32>().ok().map(f64::from)
 }
@@ -100,7 +100,7 @@ pub fn hexadecimal(text: &str) -> Option<Vec<u8>> {
     rest.is_empty().then(|| pairs.iter().map(|[high, low]| high << 4 | low).collect())
 }
 
-/// An `xs:double`. Rust reads more words than the schema: `inf`, `infinity`, `nan`.
+/// An `xs:double`. Rust's parser also accepts words that the schema does not: `inf`, `infinity`, `nan`.
 pub fn double(text: &str) -> Option<f64> {
     match trimmed(text) {
         "INF" => Some(f64::INFINITY),
@@ -144,7 +144,7 @@ fn digits(text: &str) -> Option<u64> {
     if text.bytes().all(|b| b.is_ascii_digit()) { text.parse().ok() } else { None }
 }
 
-/// Two digits between the bounds.
+/// Whether a text consists of two digits within the bounds.
 fn within(text: &str, least: u64, most: u64) -> bool {
     text.len() == 2 && digits(text).is_some_and(|number| (least..=most).contains(&number))
 }

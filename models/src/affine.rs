@@ -1,24 +1,24 @@
-//! Whether inputs enter an expression linearly, by its structure.
+//! Checks by structure whether inputs enter an expression linearly.
 //!
-//! Each part of an expression is free of inputs, affine in them, or neither. This module looks at how the parts
-//! are put together and at no number. So it refuses `a * a / a`, although that equals `a`.
+//! Each subexpression is free of inputs, affine in them, or neither. This module only considers how
+//! subexpressions are combined, not their values. So it refuses `a * a / a`, although that equals `a`.
 
 use crate::syntax::{Node, Operator, Tree};
 
-/// A part that is not affine in an input.
+/// A subexpression that is not affine in an input.
 #[derive(Debug, PartialEq)]
 pub(crate) struct NotAffine<'a> {
-    /// The smallest such part.
+    /// The smallest such subexpression.
     pub(crate) part: &'a Tree,
-    /// The input, or one of them.
+    /// The input, or one of several.
     pub(crate) input: &'a str,
 }
 
-/// The input that `tree` is affine in (one of them), or none.
+/// An input that `tree` is affine in, if there is one.
 ///
 /// # Errors
 ///
-/// The first part that is not affine.
+/// The first subexpression that is not affine.
 pub(crate) fn check<'a>(
     tree: &'a Tree,
     is_input: &dyn Fn(&str) -> bool,

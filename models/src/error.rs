@@ -1,8 +1,8 @@
-//! Errors of a model: the part that is wrong, and why.
+//! Errors of a model: which part is wrong, and why.
 
 use std::fmt;
 
-/// A model that cannot be used: which part of it, and what is wrong with it.
+/// An error in a model: which part cannot be used, and what is wrong with it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Error {
     field: String,
@@ -14,12 +14,12 @@ impl Error {
         Self { field: field.into(), message: message.into() }
     }
 
-    /// The part: `states[1]`, `derivatives.v`, or `expression` for that of a barrier.
+    /// The part: `states[1]`, `derivatives.v`, or `expression` for a barrier's expression.
     pub fn field(&self) -> &str {
         &self.field
     }
 
-    /// The reason, for a human.
+    /// The reason, as a text for the reader.
     pub fn message(&self) -> &str {
         &self.message
     }

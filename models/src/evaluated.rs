@@ -1,9 +1,10 @@
-//! Plants and barriers that somebody else's code computes, such as a plug-in's. The code gets numbers that it
-//! cannot look into and asks for operations on them. The host does these on Taylor coefficients.
+//! Plants and barriers computed by foreign code, such as a plug-in. The code gets opaque handles of numbers
+//! and requests operations on them. The host performs these on Taylor coefficients.
 //!
-//! The code runs once for each state and does its operations on the coefficients of order 0. What it asks for is
-//! written down as a tape, and continued to the orders above as the tape of an expression is. The code may look
-//! at values ([`Calculator::value`]), branch on them and look things up, since a state has one order 0.
+//! The code runs once for each state, which performs its operations on the coefficients of order 0. The
+//! operations are recorded as a tape, which then gives the higher orders as the tape of an expression does.
+//! The code may read values ([`Calculator::value`]), branch on them and look them up in tables, since each
+//! state has only one order 0.
 
 mod trial;
 
@@ -23,33 +24,34 @@ use crate::syntax::{Function, Operator};
 use crate::tape::{Operation, Record, Register, Step, Value};
 use crate::{Error, MAX_OPERATIONS, MAX_STATES};
 
-/// The name of a number in a computation, for the code to hand back.
+/// The handle of a number in a computation.
 pub type Number = u32;
 
-/// Stands for the plain number of the call, in place of a [`Number`].
+/// Stands for the literal number of the call, in place of a [`Number`].
 pub const LITERAL: Number = Number::MAX;
 
-/// Operations that code can ask for, each by its place in this list.
+/// Operations that code can request, each by its index in this list.
 pub const OPERATIONS: [&str; 19] = [
     "constant", "add", "subtract", "multiply", "divide", "power", "negate", "sqrt", "exp", "ln", "sin",
     "cos", "tan", "atan", "atan2", "abs", "tanh", "min", "max",
 ];
 
-/// Does the operations that code asks for.
+/// Performs the operations that code requests.
 pub trait Calculator {
-    /// The result of the operation numbered `operation` in [`OPERATIONS`] on `a`, and `b` where it takes two.
-    /// `literal` is the number that [`LITERAL`] stands for. An operation that cannot be done gives something that
-    /// is not a number.
+    /// The result of operation number `operation` in [`OPERATIONS`] on `a`, and on `b` if it takes two
+    /// operands. `literal` is the number that [`LITERAL`] stands for. The result of an operation that cannot
+    /// be performed is NaN.
     fn apply(&mut self, operation: u32, a: Number, b: Number, literal: f64) -> Number;
 
-    /// The value of `a`, to branch on and to look up with. A number made from it has no derivatives.
+    /// The value of `a`, for branching and table lookup. A number computed from it has no derivatives.
     fn value(&self, a: Number) -> f64;
 }
 
-/// The code of a model `ẋ = f(x) + g(x) u` with barriers. Its functions are pure and may be called on any thread.
+/// The code of a model `ẋ = f(x) + g(x) u` with barriers. Its functions must be pure, and may be called on
+/// any thread.
 pub trait Code: Send + Sync {
-    /// Writes f(x), one number for each state, and g(x), whose entry of state i and input j is at
-    /// `j * states + i`. Both come as zeros.
+    /// Writes f(x), one number for each state, and g(x), whose entry for state i and input j is at `j *
+    /// states + i`. Both are initially zero.
     fn plant(
         &self,
         c: &mut dyn Calculator,
@@ -59,7 +61,7 @@ pub trait Code: Send + Sync {
         g: &mut [Number],
     );
 
-    /// Barrier `index` at the time `t` and the state `x`.
+    /// Barrier `index` at time `t` and state `x`.
     fn barrier(
         &self,
         index: usize,
@@ -86,7 +88,7 @@ impl Dimensions {
     ///
     /// # Errors
     ///
-    /// A number out of range.
+    /// A dimension out of range.
     pub fn check(&self) -> Result<(), Error> {
         for (field, count, range) in [
             ("states", self.states, 1..=MAX_STATES),
@@ -102,7 +104,7 @@ impl Dimensions {
     }
 }
 
-/// A model by somebody's code.
+/// A model computed by foreign code.
 #[derive(Clone)]
 pub struct CodeModel {
     equations: Evaluated,
@@ -118,15 +120,16 @@ impl fmt::Debug for CodeModel {
 }
 
 impl CodeModel {
-    /// The model that `code` computes with `parameters`. It is tried at built-in samples
-    /// of states within `ranges`, which shows how much memory it needs. Later steps may do twice as many
-    /// operations and 64 more.
+    /// The model that `code` computes with `parameters`. The code is tried at built-in samples of states
+    /// within `ranges`, which shows how much memory it needs. Later steps may perform twice as many
+    /// operations, plus 64.
     ///
     /// # Errors
     ///
-    /// Dimensions out of range; a range missing; a derivative that differences of the values contradict at more
-    /// than half of the samples. Code that uses a number it was not given, asks for an operation that there is
-    /// not or for more than [`MAX_OPERATIONS`] of them, or asks for others when it is called again.
+    /// Dimensions out of range; a missing range; a derivative that contradicts the differences of the values
+    /// at more than half of the samples. Code that uses a number it was not given, requests an unknown
+    /// operation or more than [`MAX_OPERATIONS`] of them, or requests different operations when it is called
+    /// again.
     pub fn new(
         code: Arc<dyn Code>,
         dimensions: Dimensions,
@@ -154,7 +157,7 @@ impl CodeModel {
             plant_steps: 0,
             next: 0,
             fault: None,
-            looks: [false; 2],
+            reads_values: [false; 2],
         };
         trial::run(&mut equations, barriers, ranges)?;
         equations.growing = false;
@@ -164,7 +167,7 @@ impl CodeModel {
         Ok(Self { equations, barriers, identity: Arc::new(()) })
     }
 
-    /// The plant, to simulate.
+    /// The plant, for simulation.
     pub fn plant(&self) -> Box<dyn DynPlant> {
         motion::simulated(&self.equations)
     }
@@ -173,7 +176,7 @@ impl CodeModel {
     ///
     /// # Errors
     ///
-    /// An `index` that the code has no barrier for.
+    /// An `index` beyond the barriers of the code.
     pub fn barrier(&self, index: usize) -> Result<CodeBarrier, Error> {
         if index >= self.barriers {
             return Err(Error::new("barrier", format!("is {index}, must be < {}", self.barriers)));
@@ -183,7 +186,7 @@ impl CodeModel {
     }
 }
 
-/// A barrier along a [`CodeModel`].
+/// A barrier along the motion of a [`CodeModel`].
 #[derive(Clone)]
 pub struct CodeBarrier {
     equations: Evaluated,
@@ -191,18 +194,18 @@ pub struct CodeBarrier {
 }
 
 impl CodeBarrier {
-    /// The relative degree, found on built-in samples of states within `ranges`.
+    /// The relative degree, found at built-in samples of states within `ranges`.
     pub fn relative_degree(&self, ranges: &[[f64; 2]]) -> RelativeDegree {
         motion::relative_degree(&self.equations, &self.equations, ranges, false)
     }
 
-    /// The same with inputs that are not 0: one that enters only as a factor of another one, as a turn does of a speed or a
-    /// thrust, is seen too.
+    /// The relative degree with nonzero inputs. It also sees an input that only multiplies another one, as a
+    /// turn rate multiplies a speed or a thrust.
     pub fn driven_degree(&self, ranges: &[[f64; 2]]) -> RelativeDegree {
         motion::relative_degree(&self.equations, &self.equations, ranges, true)
     }
 
-    /// Its derivatives at relative degree `n`, for a filter.
+    /// Its derivatives up to relative degree `n`, for a filter.
     ///
     /// # Errors
     ///
@@ -212,13 +215,13 @@ impl CodeBarrier {
     }
 }
 
-/// Registers between those of the inputs and the first result: time, zero, one, not a number.
+/// Number of registers between the inputs and the first result: time, zero, one, NaN.
 const RESERVED: usize = 4;
 
-/// Largest distance back on the tape, in operations, at which a cosine finds the sine it is computed with.
+/// How far back on the tape, in operations, a cosine looks for the sine computed with it.
 const RECENT: usize = 16;
 
-/// Reasons why an operation that code asked for could not be done.
+/// Reasons why a requested operation could not be performed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fault {
     Number(Number),
@@ -242,7 +245,7 @@ impl fmt::Display for Fault {
     }
 }
 
-/// The tape of a model by code. Registers: states, inputs, [`RESERVED`], results.
+/// The tape of a model computed by code. Registers: states, inputs, [`RESERVED`], results.
 struct Evaluated {
     code: Arc<dyn Code>,
     parameters: Vec<f64>,
@@ -250,26 +253,26 @@ struct Evaluated {
     inputs: usize,
     /// The index of the barrier.
     barrier: usize,
-    /// Whether memory may be added: in the trial only.
+    /// Whether memory may grow, as it may only in the trial.
     growing: bool,
     registers: usize,
     x: Vec<Number>,
     f: Vec<Number>,
     g: Vec<Number>,
     derivatives: Vec<Register>,
-    /// The operations that the code asked for.
+    /// The operations that the code requested.
     steps: Vec<Step>,
     /// Number of the steps that belong to the plant.
     plant_steps: usize,
-    /// The first register that the steps leave free.
+    /// The first free register after the steps.
     next: Register,
     fault: Option<Fault>,
-    /// Whether the plant, and the barrier, asked for one value of what was enclosed as many.
-    looks: [bool; 2],
+    /// Whether the plant, and the barrier, read the single value of an interval.
+    reads_values: [bool; 2],
 }
 
 impl Clone for Evaluated {
-    /// Keeps room for as many steps as there are registers, so that a step need not allocate.
+    /// Reserves capacity for as many steps as there are registers, so that a step does not allocate.
     fn clone(&self) -> Self {
         let mut steps = Vec::with_capacity(self.registers);
         steps.extend_from_slice(&self.steps);
@@ -291,7 +294,7 @@ impl Evaluated {
         self.states + self.inputs
     }
 
-    /// The operations that the last call asked for, and the numbers it gave.
+    /// The operations that the last call requested, and the numbers it returned.
     fn asked(&self) -> (Vec<Step>, Vec<Number>) {
         (self.steps.clone(), [&self.f[..], &self.g].concat())
     }
@@ -301,19 +304,19 @@ impl Evaluated {
 struct Work<'a, C> {
     series: &'a mut Series<C>,
     steps: &'a mut Vec<Step>,
-    /// Number of the steps that another call recorded.
+    /// Number of steps recorded by the call before.
     others: usize,
     next: Register,
-    /// Registers that the code is not given: inputs, and what another call has computed.
+    /// Registers that are hidden from the code: the inputs, and the results of the call before.
     hidden: [Range<Register>; 2],
     /// The first input.
     inputs: Register,
-    /// The reserved registers from this one on: zero, one, not a number.
+    /// The first of three reserved registers: zero, one, NaN.
     zero: Register,
     growing: bool,
     fault: Option<Fault>,
-    /// Whether the code asked for one value of what was enclosed as many.
-    looks: Cell<bool>,
+    /// Whether the code read the single value of an interval.
+    reads_values: Cell<bool>,
 }
 
 impl<C: Scalar> Work<'_, C> {
@@ -379,7 +382,7 @@ impl<C: Scalar> Record for Work<'_, C> {
         if self.fault.is_some() {
             return self.not_a_number();
         }
-        // Sine and cosine are computed together, and mostly asked for near each other.
+        // Sine and cosine are computed together, and usually requested close together.
         if matches!(operation, Operation::SinCos(_)) {
             let recent = self.steps[self.others..].iter().rev().take(RECENT);
             if let Some(done) = recent.into_iter().find(|step| step.operation == operation) {
@@ -448,7 +451,7 @@ impl<C: Scalar> Calculator for Work<'_, C> {
         }
         let value = self.series.get(register, 0);
         if value.compare(value).is_none() {
-            self.looks.set(true);
+            self.reads_values.set(true);
         }
         value.value()
     }
@@ -487,18 +490,18 @@ impl Equations for Evaluated {
             steps: &mut self.steps,
             others: 0,
             next: time + RESERVED,
-            // The time is for barriers only.
+            // Only barriers may use the time.
             hidden: [self.states..time + 1, 0..0],
             inputs: self.states,
             zero: time + 1,
             growing: self.growing,
             fault: None,
-            looks: Cell::new(false),
+            reads_values: Cell::new(false),
         };
         self.code.plant(&mut work, &self.parameters, &self.x, &mut self.f, &mut self.g);
         work.combine(&self.f, &self.g, &mut self.derivatives);
         let nan = work.not_a_number();
-        (self.next, self.fault, self.looks[0]) = (work.next, work.fault, work.looks.get());
+        (self.next, self.fault, self.reads_values[0]) = (work.next, work.fault, work.reads_values.get());
         self.plant_steps = self.steps.len();
         if self.fault.is_some() {
             self.derivatives.fill(nan);
@@ -510,7 +513,7 @@ impl Equations for Evaluated {
     }
 
     fn encloses(&self) -> [bool; 2] {
-        self.looks.map(|looks| !looks)
+        self.reads_values.map(|reads_values| !reads_values)
     }
 
     fn finish<C: Scalar>(&mut self, series: &mut Series<C>, n: usize) -> Register {
@@ -521,18 +524,18 @@ impl Equations for Evaluated {
             steps: &mut self.steps,
             others: self.plant_steps,
             next: self.next,
-            // The plant's results have no coefficient of order n.
+            // The results of the plant have no coefficient of order n.
             hidden: [self.states..time, time + RESERVED..self.next],
             inputs: self.states,
             zero: time + 1,
             growing: self.growing,
             fault: self.fault,
-            looks: Cell::new(false),
+            reads_values: Cell::new(false),
         };
         let h = self.code.barrier(self.barrier, &mut work, &self.parameters, time as Number, &self.x);
         let h = work.checked(h);
         let (fault, nan, end) = (work.fault, work.not_a_number(), work.next);
-        self.looks[1] = work.looks.get();
+        self.reads_values[1] = work.reads_values.get();
         for k in 1..=n {
             series.advance(&self.steps[self.plant_steps..], k);
         }

@@ -1,12 +1,12 @@
-//! Expressions of state and time, such as a feedback.
+//! Expressions of state and time, such as a feedback law.
 
 use punctual_core::scalar::Scalar;
 
 use crate::series::Series;
 use crate::tape::{Register, Step};
 
-/// The values of expressions such as `-k * v`, made by [`Model::functions`](crate::Model::functions); with
-/// [`Tangent`](punctual_core::jet::Tangent)s also their derivatives along a direction.
+/// Evaluates expressions such as `-k * v`, made by [`Model::functions`](crate::Model::functions). With
+/// [`Tangent`](punctual_core::jet::Tangent)s, it also gives their derivatives along a direction.
 #[derive(Clone, Debug)]
 pub struct Functions<C> {
     pub(crate) steps: Vec<Step>,
@@ -27,7 +27,7 @@ impl<C: Scalar> Functions<C> {
         self.results.is_empty()
     }
 
-    /// The value of each expression at time `t` in s, where state `i` is `x(i)`. Not a number where a function is outside
+    /// The value of each expression at time `t` in s, where state `i` is `x(i)`. NaN if a function is outside
     /// its domain.
     pub fn at(&mut self, t: f64, x: impl Fn(usize) -> C) -> impl Iterator<Item = C> {
         for i in 0..self.states {

@@ -1,8 +1,8 @@
 //! Plants and barriers written as expressions, such as `v * cos(theta)`.
 //!
-//! A [`Model`] takes the names of states, inputs and parameters and one expression for the derivative of each
-//! state, affine in the inputs. It gives a plant to simulate, and for any barrier `h(t, x)` its derivatives along
-//! the plant, of any order, as the filter takes them.
+//! A [`Model`] takes the names of states, inputs and parameters, and for each state an expression of its
+//! derivative, affine in the inputs. It gives a plant to simulate. For any barrier `h(t, x)`, it gives the
+//! derivatives along the plant, of any order, which the filter needs.
 //!
 //! ```
 //! use punctual_core::filter::{BarrierSettings, Filter};
@@ -23,35 +23,35 @@
 //!
 //! # Expressions
 //!
-//! Numbers, names, `+ - * / ^` and parentheses. `^` is done first and from the right, and then the sign, so that
-//! `-x^2` is −(x²). The functions are those of [`FUNCTIONS`]; angles are in radians. `pi` is π, and `t`, in
-//! barriers only, the time in s. `abs`, `min` and `max` have kinks, where the derivatives are those of the first
-//! argument. A function outside its domain (`sqrt` of a negative number) is not a number. The filter reports that
-//! as a status, and the plant as an error of the step.
+//! Numbers, names, `+ - * / ^` and parentheses. `^` is evaluated first and from the right, then the sign, so
+//! that `-x^2` is −(x²). The functions are those of [`FUNCTIONS`]; angles are in radians. `pi` is π. In
+//! barriers, `t` is the time in s. `abs`, `min` and `max` have kinks, where they take the derivatives of the
+//! first argument. A function outside its domain (`sqrt` of a negative number) gives NaN, which the filter
+//! reports as a status, and the plant as an error of the step.
 //!
 //! # How they are computed
 //!
-//! Trees become one tape on which each operation occurs once (`tape`). The tape gives Taylor coefficient after
-//! Taylor coefficient of all its registers (`series`). So a step costs what its operations cost, and allocates
-//! nothing.
+//! Trees become one tape on which each operation occurs once (`tape`). The tape gives the Taylor coefficients
+//! of all its registers, order by order (`series`). So the cost of a step is that of its operations, and it
+//! does not allocate.
 //!
-//! Layers, each using only those above it:
+//! Modules, each using only those above it:
 //!
 //! | module | owns |
 //! |---|---|
 //! | `error` | the part that is wrong, and why |
-//! | `names` | the name that was meant |
-//! | `syntax` | text to tree |
+//! | `names` | suggestions for misspelled names |
+//! | `syntax` | parsing text into trees |
 //! | `affine` | whether inputs enter linearly |
 //! | `units` | whether the units can be right |
 //! | `tape` | trees to one tape: constants folded, equal operations merged |
 //! | `series` | Taylor coefficients of a tape |
 //! | `motion` | the motion of a plant, and the series of a barrier along it |
-//! | `evaluated` | plants and barriers that somebody else's code computes |
+//! | `evaluated` | plants and barriers computed by foreign code |
 //! | `functions` | values of expressions of state and time |
-//! | `model` | plants and barriers of expressions |
+//! | `model` | plants and barriers given by expressions |
 #![forbid(unsafe_code)]
-// Elementary functions are those of the core: clippy.toml.
+// Elementary functions come from the core: see clippy.toml.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 mod affine;

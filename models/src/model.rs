@@ -1,4 +1,4 @@
-//! Plants and barriers of expressions, as the filter and the simulation take them.
+//! Plants and barriers given by expressions, in the form that the filter and the simulation need.
 
 use std::any::Any;
 use std::collections::BTreeSet;
@@ -16,7 +16,7 @@ use crate::syntax::{self, TIME, Tree};
 use crate::tape::{Record, Register, Step, Tape, Value, needed, unknown};
 use crate::{Error, MAX_STATES, affine};
 
-/// A plant `ẋ = f(x) + g(x) u` given by an expression for each component.
+/// A plant `ẋ = f(x) + g(x) u` with one expression for each component.
 ///
 /// Registers: states, inputs, time, then results.
 #[derive(Clone, Debug)]
@@ -32,15 +32,15 @@ pub struct Model {
 }
 
 impl Model {
-    /// A model with the names of its states and inputs, its parameters with their values, and the expression for
-    /// the derivative of each state, in their order.
+    /// A model with the names of its states and inputs, its parameters with their values, and the expression
+    /// for the derivative of each state, in their order.
     ///
     /// # Errors
     ///
-    /// No state or more than [`MAX_STATES`], no input or more than [`MAX_INPUTS`]; another number of derivatives
-    /// than of states; a parameter that is not finite. A name that is no identifier, occurs twice or means
-    /// something else. In an expression: text that cannot be read, an unknown name, the time, a wrong number of
-    /// arguments, an input that does not enter linearly.
+    /// No state or more than [`MAX_STATES`], no input or more than [`MAX_INPUTS`]; different numbers of
+    /// derivatives and states; a parameter that is not finite. A name that is no identifier, occurs twice or
+    /// is reserved. In an expression: a syntax error, an unknown name, the time, a wrong number of arguments,
+    /// an input that does not enter linearly.
     pub fn new(
         states: &[&str],
         inputs: &[&str],
@@ -104,11 +104,12 @@ impl Model {
         self
     }
 
-    /// The values of expressions of states, parameters and the time `t`; each has a name for messages.
+    /// Evaluates expressions of states, parameters and the time `t`. Each is given with a name for messages.
     ///
     /// # Errors
     ///
-    /// By that name: text that cannot be read, an unknown name or an input, a wrong number of arguments.
+    /// For the expression of this name: a syntax error, an unknown name or an input, a wrong number of
+    /// arguments.
     pub fn functions<C: Scalar>(&self, expressions: &[(&str, &str)]) -> Result<Functions<C>, Error> {
         let mut model = self.clone();
         let mut results = Vec::with_capacity(expressions.len());
@@ -148,7 +149,7 @@ impl Model {
         Ok(self.tape.register(value))
     }
 
-    /// The plant, to simulate.
+    /// The plant, for simulation.
     pub fn plant(&self) -> Box<dyn DynPlant> {
         motion::simulated(&self.equations(None))
     }
@@ -157,7 +158,7 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// In the expression: text that cannot be read, an unknown name or an input, a wrong number of arguments.
+    /// In the expression: a syntax error, an unknown name or an input, a wrong number of arguments.
     pub fn barrier(&self, expression: &str) -> Result<Barrier, Error> {
         let mut model = self.clone();
         let tree = syntax::parse(expression);
@@ -181,7 +182,7 @@ fn check_name<'a>(name: &'a str, seen: &mut BTreeSet<&'a str>) -> Result<(), Str
     Ok(())
 }
 
-/// A barrier along a [`Model`].
+/// A barrier along the motion of a [`Model`].
 #[derive(Clone, Debug)]
 pub struct Barrier {
     model: Model,
@@ -189,7 +190,7 @@ pub struct Barrier {
 }
 
 impl Barrier {
-    /// The relative degree, found on built-in samples of states within `ranges`.
+    /// The relative degree, found at built-in samples of states within `ranges`.
     pub fn relative_degree(&self, ranges: &[[f64; 2]]) -> RelativeDegree {
         motion::relative_degree(
             &self.model.equations(None),
@@ -199,8 +200,8 @@ impl Barrier {
         )
     }
 
-    /// The same with inputs that are not 0: one that enters only as a factor of another one, as a turn does of a speed or a
-    /// thrust, is seen too.
+    /// The relative degree with nonzero inputs. It also sees an input that only multiplies another one, as a
+    /// turn rate multiplies a speed or a thrust.
     pub fn driven_degree(&self, ranges: &[[f64; 2]]) -> RelativeDegree {
         motion::relative_degree(
             &self.model.equations(None),
@@ -210,7 +211,7 @@ impl Barrier {
         )
     }
 
-    /// Its derivatives at relative degree `n`, for a filter.
+    /// Its derivatives up to relative degree `n`, for a filter.
     ///
     /// # Errors
     ///
@@ -221,22 +222,22 @@ impl Barrier {
     }
 }
 
-/// The tape of a model, computed order by order: every operation at one order before the next order.
+/// The tape of a model, evaluated order by order: every operation at one order before the next order.
 #[derive(Clone)]
 struct Listed {
     states: usize,
     inputs: usize,
     registers: usize,
-    /// Operations of every order but the last.
+    /// Operations needed at every order except the last.
     steps: Vec<Step>,
     derivatives: Vec<Register>,
-    /// Operations of the last order, at which only the barrier is needed.
+    /// Operations needed at the last order, which only the barrier requires.
     last: Vec<Step>,
     h: Register,
 }
 
 impl Model {
-    /// The tape of the model, with the operations of the barrier in `h`.
+    /// The tape of the model, with the operations of the barrier whose result is `h`.
     fn equations(&self, h: Option<Register>) -> Listed {
         let Tape { steps, registers, .. } = &self.tape;
         let wanted: Vec<_> = self.derivatives.iter().copied().chain(h).collect();

@@ -1,4 +1,5 @@
-//! The motion of a plant and the series of a barrier along it, whether a tape or code does the operations.
+//! The motion of a plant, and the series of a barrier along it. A tape or foreign code performs the
+//! operations.
 
 use std::any::Any;
 use std::cell::RefCell;
@@ -22,7 +23,7 @@ use crate::tape::Register;
 /// Which plant a model is: one object for all barriers along it.
 pub(crate) type Identity = Arc<dyn Any + Send + Sync>;
 
-/// The operations of a plant, or of a barrier along one. Registers: states, inputs, time, then results.
+/// The operations of a plant, or of a barrier along it. Registers: states, inputs, time, then results.
 pub(crate) trait Equations: Clone + Send + 'static {
     /// Number of states.
     fn states(&self) -> usize;
@@ -33,23 +34,25 @@ pub(crate) trait Equations: Clone + Send + 'static {
     /// Memory for `orders` coefficients of every register.
     fn series<C: Scalar>(&self, orders: usize) -> Series<C>;
 
-    /// Computes coefficient `k` of the derivatives of the states, after those below it.
+    /// Computes coefficient `k` of the derivatives of the states, after all lower ones.
     fn advance<C: Scalar>(&mut self, series: &mut Series<C>, k: usize);
 
-    /// The register of the derivative of state `i`, once [`Self::advance`] was done.
+    /// The register of the derivative of state `i`, once [`Self::advance`] has run.
     fn derivative(&self, i: usize) -> Register;
 
-    /// Whether the last coefficients of the plant, and of the barrier, enclose all values where they were computed on enclosures.
+    /// Whether the last coefficients of the plant, and of the barrier, enclose all values if they were
+    /// computed with intervals.
     fn encloses(&self) -> [bool; 2] {
         [true; 2]
     }
 
-    /// Computes the coefficients of the barrier up to `n`, after those of the states, and returns their register.
+    /// Computes the coefficients of the barrier up to `n`, after those of the states, and returns their
+    /// register.
     fn finish<C: Scalar>(&mut self, series: &mut Series<C>, n: usize) -> Register;
 }
 
-/// Calls `$function::<_, M>` with the least number `M` of directions that is enough for `$inputs`. A few zeros
-/// are the price of fewer instances of the code.
+/// Calls `$function::<_, M>` with the least available number `M` of directions that suffices for `$inputs`. A
+/// few zero directions are the price of fewer instantiations.
 macro_rules! with_directions {
     ($inputs:expr, $function:ident($($argument:expr),*)) => {
         match $inputs {
@@ -65,8 +68,8 @@ macro_rules! with_directions {
     };
 }
 
-/// The relative degree of the barrier `along` the plant, found on built-in samples of states within `ranges`. With
-/// inputs that are 0; or `driven`, with others: an input that enters only as a factor of another one is seen then.
+/// The relative degree of the barrier `along` the plant, found at built-in samples of states within `ranges`.
+/// Inputs are zero, or nonzero if `driven`, which also reveals an input that only multiplies another one.
 pub(crate) fn relative_degree<E: Equations>(
     plant: &E,
     along: &E,
@@ -81,15 +84,15 @@ pub(crate) fn relative_degree<E: Equations>(
     ) -> RelativeDegree {
         let mut series = Along::<E, Dual<M>>::new(plant, along, MAX_RELATIVE_DEGREE);
         let samples = internal::samples(ranges);
-        // Numbers that no model treats apart.
+        // Values that are special for no model.
         let u = |i: usize| if driven { 0.7 + 0.11 * i as f64 } else { 0.0 };
         internal::relative_degree_of(plant.inputs(), samples, |t, x| series.coefficients(t, x, u))
     }
     with_directions!(plant.inputs(), found(plant, along, ranges, driven))
 }
 
-/// The derivatives of the barrier `along` the plant at relative degree `n`, for a filter. Sources of one `identity` are along
-/// one plant.
+/// The derivatives of the barrier `along` the plant up to relative degree `n`, for a filter. Sources of one `identity` are
+/// along one plant.
 ///
 /// # Errors
 ///
@@ -128,12 +131,12 @@ pub(crate) fn source<E: Equations>(
     Ok(with_directions!(plant.inputs(), made(plant, along, n, identity)))
 }
 
-/// The plant, to simulate.
+/// The plant, for simulation.
 pub(crate) fn simulated<E: Equations>(plant: &E) -> Box<dyn DynPlant> {
     Box::new(Simulated { work: RefCell::new(Flow::new(plant)), inputs: plant.inputs() })
 }
 
-/// The motion of a plant: registers, and the stages of the Runge-Kutta method.
+/// The motion of a plant: registers, and the stages of the Runge–Kutta method.
 struct Flow<E, C> {
     equations: E,
     series: Series<C>,
@@ -173,7 +176,7 @@ impl<E: Equations, C: Scalar> Flow<E, C> {
         }
     }
 
-    /// Moves the state as the predictions of [`lie`] do: by one step where that does.
+    /// Moves the state as the predictions of [`lie`](punctual_core::lie) do: in one step if that suffices.
     fn predict(&mut self, duration: f64) {
         self.run(duration, 1);
         if !internal::is_even(self.stages.each_ref().map(Vec::as_slice)) {
@@ -184,7 +187,7 @@ impl<E: Equations, C: Scalar> Flow<E, C> {
         }
     }
 
-    /// Moves the state; the method and its order of additions are those of [`flow`](punctual_core::lie::flow).
+    /// Moves the state with the method of [`flow`](punctual_core::lie::flow), in the same order of additions.
     fn run(&mut self, duration: f64, steps: usize) {
         let dt = duration / steps as f64;
         for _ in 0..steps {
@@ -212,7 +215,7 @@ impl<E: Equations, C: Scalar> Flow<E, C> {
     }
 }
 
-/// A plant to simulate.
+/// A plant for simulation.
 struct Simulated<E> {
     work: RefCell<Flow<E, f64>>,
     inputs: usize,
@@ -267,12 +270,12 @@ struct Along<E, C> {
 impl<E: Equations, C: Scalar> Along<E, C> {
     fn new(plant: &E, along: &E, n: usize) -> Self {
         let mut series = along.series(n + 1);
-        // Time grows with slope 1; inputs are held.
+        // Time has slope 1; inputs are held.
         series.set(along.states() + along.inputs(), 1, C::from(1.0));
         Self { flow: Flow::new(plant), equations: along.clone(), series, h: 0, n }
     }
 
-    /// Computes the coefficients of h from the state and the inputs that `flow` has, at time `t`.
+    /// Computes the coefficients of h from the state and the inputs of `flow`, at time `t`.
     fn continue_from_flow(&mut self, t: f64) {
         let (series, flow) = (&mut self.series, &self.flow);
         let time = flow.inputs().end;
@@ -312,14 +315,14 @@ impl<E: Equations, C: Scalar> Along<E, C> {
         series.get(self.h, 0)
     }
 
-    /// Computes the coefficients of h `duration` ahead, from the state and the inputs that `flow` has.
+    /// Computes the coefficients of h `duration` ahead, starting from the state and the inputs of `flow`.
     fn ahead(&mut self, t: f64, duration: f64) {
         self.flow.run(duration, SUBSTEPS);
         self.continue_from_flow(t + duration);
     }
 }
 
-/// Derivatives along `M` directions, at least as many as inputs.
+/// With derivatives along `M` directions, at least as many as inputs.
 impl<E: Equations, const M: usize> Along<E, Dual<M>> {
     fn hold(&mut self, u: impl Fn(usize) -> f64) {
         self.flow.hold((0..M).map(|i| Dual::variable(u(i), i)));
@@ -352,7 +355,7 @@ impl<E: Equations, const M: usize> Along<E, Dual<M>> {
     }
 }
 
-/// A barrier along a plant, as the filter takes it.
+/// A barrier along a plant, in the form that the filter needs.
 struct Source<E, const M: usize> {
     work: RefCell<Work<E, M>>,
     identity: Identity,
@@ -361,7 +364,7 @@ struct Source<E, const M: usize> {
     n: usize,
 }
 
-/// Memory of the evaluations at a sample and ahead of it.
+/// Memory for evaluations at a sample and ahead of it.
 struct Work<E, const M: usize> {
     along: Along<E, Dual<M>>,
     flow: Flow<E, f64>,
@@ -369,10 +372,10 @@ struct Work<E, const M: usize> {
     flow_tangent: Flow<E, Tangent<f64>>,
     expansions: Along<E, f64>,
     value: Along<E, f64>,
-    /// Enclosures of h, and of it and its rate.
+    /// For enclosures of h, and of h with its rate.
     few_over: Along<E, Interval>,
     expansions_over: Along<E, Interval>,
-    /// The states and their rates while an input is held, and the rates at its begin.
+    /// Enclosures of the states and their rates while an input is held, and the rates at its start.
     held: Vec<[Interval; 2]>,
     rate: Vec<f64>,
 }
@@ -411,7 +414,7 @@ impl<E: Equations, const M: usize> DerivativeSource for Source<E, M> {
             if k == self.n {
                 out.row[..self.inputs].copy_from_slice(&gradient[..self.inputs]);
             } else {
-                // A sum and not a maximum: `f64::max` would drop a NaN.
+                // A sum rather than a maximum, since `f64::max` would drop a NaN.
                 out.lower_sensitivity += gradient.iter().map(|d| d.abs()).sum::<f64>();
             }
         }
@@ -434,7 +437,8 @@ impl<E: Equations, const M: usize> DerivativeSource for Source<E, M> {
     }
 }
 
-/// The way ahead is shared. At a sample the operations of plant and barrier are one tape, so of that motion its begin is.
+/// Barriers share the predicted motion. At a sample, plant and barrier are evaluated as one tape, so only the
+/// initial state is shared.
 impl<E: Equations, const M: usize> SharedPlant for Source<E, M> {
     fn plant(&self) -> PlantId {
         PlantId::of(&self.identity, [self.states, self.inputs])
@@ -446,17 +450,17 @@ impl<E: Equations, const M: usize> SharedPlant for Source<E, M> {
     }
 
     fn motion(&self, x: &[f64], room: &mut dyn Any) {
-        let begin: &mut Vec<f64> = room.downcast_mut().expect(ROOM);
+        let begin: &mut Vec<f64> = room.downcast_mut().expect(FOREIGN_ROOM);
         begin.copy_from_slice(x);
     }
 
     fn evaluate_along(&self, t: f64, motion: &dyn Any, out: &mut Derivatives) {
-        let begin: &Vec<f64> = motion.downcast_ref().expect(ROOM);
+        let begin: &Vec<f64> = motion.downcast_ref().expect(FOREIGN_ROOM);
         self.evaluate(t, begin, out);
     }
 
     fn motion_ahead(&self, x: &[f64], u: &[f64], duration: f64, room: &mut dyn Any) {
-        let arrival: &mut Vec<Dual<M>> = room.downcast_mut().expect(ROOM);
+        let arrival: &mut Vec<Dual<M>> = room.downcast_mut().expect(FOREIGN_ROOM);
         let along = &mut self.work.borrow_mut().along;
         along.arrive(x, u, duration);
         for (register, value) in arrival.iter_mut().enumerate() {
@@ -465,7 +469,7 @@ impl<E: Equations, const M: usize> SharedPlant for Source<E, M> {
     }
 
     fn ahead_of_row_along(&self, t: f64, motion: &dyn Any, out: &mut Ahead) {
-        let arrival: &Vec<Dual<M>> = motion.downcast_ref().expect(ROOM);
+        let arrival: &Vec<Dual<M>> = motion.downcast_ref().expect(FOREIGN_ROOM);
         let along = &mut self.work.borrow_mut().along;
         along.flow.set_state(arrival.iter().copied());
         along.continue_from_flow(t);
@@ -473,8 +477,8 @@ impl<E: Equations, const M: usize> SharedPlant for Source<E, M> {
     }
 }
 
-/// What a room that is not of the plant would break.
-const ROOM: &str = "a room that a source along the same plant has made";
+/// Panic message for a workspace of another plant.
+const FOREIGN_ROOM: &str = "a room made by a source along the same plant";
 
 impl<E: Equations, const M: usize> Predict for Source<E, M> {
     fn flow(&self, x: &mut [f64], u: &[f64], duration: f64) {
@@ -539,7 +543,7 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
     fn is_still(&self, x: &[f64]) -> Option<bool> {
         let few_over = &mut self.work.borrow_mut().few_over;
         let mut at = |time| few_over.follow(time, |i, _| Interval::from(x[i]));
-        // Where time is not used, the bits are the same.
+        // If time is not used, both results have the same bits.
         let is_still = at(Interval::ALL) == at(Interval::from(0.0));
         few_over.equations.encloses()[1].then_some(is_still)
     }

@@ -1,9 +1,9 @@
-//! Names that are nearly those that somebody meant.
+//! Suggests names similar to a misspelled one.
 
-/// Fewest characters of a beginning that stands for the whole name.
+/// The fewest characters of a prefix that suggests the whole name.
 const BEGINNING: usize = 3;
 
-/// " (did you mean x?)" where one of the `known` names is near to `name`, else nothing.
+/// " (did you mean x?)" if one of the `known` names is similar to `name`, else empty.
 pub fn nearest(name: &str, known: &[&str]) -> String {
     let name = name.to_lowercase();
     let distance = |other: &str| {

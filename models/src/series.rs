@@ -1,10 +1,10 @@
-//! Taylor coefficients of a tape, one order after the other.
+//! Computes the Taylor coefficients of a tape, order by order.
 //!
-//! Coefficient k of a result needs the coefficients up to k of its operands. So a solution of ẋ = f(x) + g(x) u
-//! can be continued order by order, and each operation is done once for each order. Running a function on whole
-//! series would do it again for every order of the solution. The recurrences are those of
-//! [`Taylor`](punctual_core::jet::Taylor), whose tests are the reference for this module. The coefficients are
-//! numbers, or dual numbers along the inputs.
+//! Coefficient k of a result needs the coefficients up to k of its operands. So a solution of ẋ = f(x) + g(x)
+//! u can be extended order by order, with each operation performed once for each order. Evaluating a function
+//! on whole series would repeat it for every order of the solution. The recurrences are those of
+//! [`Taylor`](punctual_core::jet::Taylor), whose tests are the reference for this module. The coefficients
+//! are numbers, or dual numbers along the inputs.
 //!
 //! # References
 //!
@@ -27,7 +27,7 @@ pub(crate) struct Series<C> {
 }
 
 impl<C: Scalar> Series<C> {
-    /// Zeros, of orders 0 to `orders` − 1.
+    /// Zeros, for orders 0 to `orders` − 1.
     pub(crate) fn new(registers: usize, orders: usize) -> Self {
         Self { coefficients: vec![C::zero(); registers * orders], orders }
     }
@@ -37,7 +37,7 @@ impl<C: Scalar> Series<C> {
         self.coefficients.len() / self.orders
     }
 
-    /// Makes room for `registers`, with zeros.
+    /// Grows to `registers` registers, filled with zeros.
     pub(crate) fn grow(&mut self, registers: usize) {
         self.coefficients.resize(registers * self.orders, C::zero());
     }
@@ -79,14 +79,14 @@ impl<C: Scalar> Series<C> {
         sum * (1.0 / k as f64)
     }
 
-    /// Does `steps` for the coefficients of order `k`, after those below it.
+    /// Performs `steps` for the coefficients of order `k`, after the lower ones.
     pub(crate) fn advance(&mut self, steps: &[Step], k: usize) {
         for step in steps {
             self.advance_one(step, k);
         }
     }
 
-    /// Does one step for the coefficient of order `k`.
+    /// Performs one step for the coefficient of order `k`.
     #[inline]
     pub(crate) fn advance_one(&mut self, &Step { operation, to }: &Step, k: usize) {
         let value = if k == 0 { self.first(operation, to) } else { self.next(operation, to, k) };
@@ -168,7 +168,7 @@ impl<C: Scalar> Series<C> {
                 value
             }
             O::Atan(a, slope) => (at(a) - self.integral(to, slope, k, k - 1)) / start(slope),
-            // Across the negative half of the axis the angle jumps.
+            // The angle jumps across the negative half of the x axis.
             O::Atan2(y, x, _)
                 if start(y).compare(C::zero()).is_none()
                     && start(x).compare(C::zero()) != Some(Ordering::Greater) =>

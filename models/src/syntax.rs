@@ -1,7 +1,7 @@
-//! Text to tree.
+//! Parses text into trees.
 //!
-//! The grammar is winnow's Pratt parser over four kinds of operands. Signs, operators and nesting, which could
-//! make it recurse deeply, are counted before it runs. So no text overflows the stack.
+//! The grammar is winnow's Pratt parser over four kinds of operands. Signs, operators and nesting, which
+//! could make it recurse deeply, are counted before it runs. So no text overflows the stack.
 
 use std::ops::Range;
 
@@ -18,7 +18,7 @@ pub const MAX_LENGTH: usize = 4096;
 /// Most operators and signs in an expression.
 pub const MAX_OPERATORS: usize = 512;
 
-/// Deepest nesting of parentheses; also most `^` in an expression, and most signs in a row.
+/// Deepest nesting of parentheses; also the most `^` in an expression, and the most signs in a row.
 pub const MAX_NESTING: usize = 32;
 
 /// A function of expressions.
@@ -26,7 +26,7 @@ pub const MAX_NESTING: usize = 32;
 pub enum Function {
     /// Square root.
     Sqrt,
-    /// e to the power.
+    /// The exponential function.
     Exp,
     /// Natural logarithm.
     Ln,
@@ -38,7 +38,7 @@ pub enum Function {
     Tan,
     /// Arc tangent.
     Atan,
-    /// `atan2(y, x)`: angle of a point.
+    /// `atan2(y, x)`: the angle of a point.
     Atan2,
     /// Hyperbolic tangent.
     Tanh,
@@ -66,7 +66,7 @@ pub const FUNCTIONS: [(&str, Function, usize); 12] = [
     ("max", Function::Max, 2),
 ];
 
-/// Time, in barriers.
+/// The time, which only barriers may use.
 pub(crate) const TIME: &str = "t";
 /// π.
 pub(crate) const PI: &str = "pi";
@@ -91,7 +91,7 @@ pub(crate) fn is_identifier(name: &str) -> bool {
     name.starts_with(is_first_in_name) && name.chars().all(is_in_name)
 }
 
-/// Whether `name` means something in every expression and so cannot name a variable.
+/// Whether `name` has a meaning in every expression and so cannot name a variable.
 pub fn is_reserved(name: &str) -> bool {
     name == TIME || name == PI || FUNCTIONS.iter().any(|f| f.0 == name)
 }
@@ -114,7 +114,7 @@ pub(crate) enum Node {
     Call(String, Vec<Tree>),
 }
 
-/// An expression and the bytes of the text that it is in.
+/// An expression and its range of bytes in the text.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Tree {
     pub(crate) node: Node,
@@ -123,11 +123,11 @@ pub(crate) struct Tree {
 
 type Input<'a> = LocatingSlice<&'a str>;
 
-/// Reads an expression.
+/// Parses an expression.
 ///
 /// # Errors
 ///
-/// The first defect in words, with its position in the text, counted from 1.
+/// A message on the first defect, with its position in the text, counted from 1.
 pub(crate) fn parse(text: &str) -> Result<Tree, String> {
     check_size(text)?;
     sum.parse(LocatingSlice::new(text)).map_err(|e| {
@@ -146,7 +146,7 @@ pub(crate) fn parse(text: &str) -> Result<Tree, String> {
     })
 }
 
-/// What is written otherwise here than in another language, or with another character.
+/// Notations of other languages, or with other characters, and what to write instead.
 const HABITS: [(&str, &str); 16] = [
     ("=", "an expression has no =; a barrier is what is to be >= 0, a derivative the right-hand side alone"),
     ("<", "an expression has no comparison; a barrier is what is to be >= 0, as b - a for a <= b"),
@@ -166,7 +166,7 @@ const HABITS: [(&str, &str); 16] = [
     ("\u{b3}", "a cube is written ^3"),
 ];
 
-/// What to write instead, where an expression goes on with `rest` after `before`.
+/// A hint on what to write instead if an expression continues with `rest` after `before`.
 fn hint(before: &str, rest: &str) -> String {
     let (before, next) = (before.trim_end(), rest.chars().next());
     let is_digit = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
@@ -185,7 +185,7 @@ fn hint(before: &str, rest: &str) -> String {
     advice.map_or_else(String::new, |advice| format!("; {advice}"))
 }
 
-/// Refuses what could make the parser, or a walk over its tree, recurse deeply.
+/// Refuses text that could make the parser, or a walk over its tree, recurse deeply.
 fn check_size(text: &str) -> Result<(), String> {
     if text.len() > MAX_LENGTH {
         return Err(format!("has {} bytes, must have at most {MAX_LENGTH}", text.len()));
@@ -226,7 +226,7 @@ fn binary(operator: Operator, a: Tree, b: Tree) -> ModalResult<Tree> {
     Ok(Tree { node: Node::Binary(operator, Box::new([a, b])), span })
 }
 
-/// Reads operands under operators; the larger its power, the sooner an operator is done.
+/// Parses operands and operators; an operator with a higher power binds more tightly.
 fn sum(input: &mut Input<'_>) -> ModalResult<Tree> {
     const PLUS: i64 = 10;
     const TIMES: i64 = 20;
@@ -270,7 +270,7 @@ fn number(input: &mut Input<'_>) -> ModalResult<Node> {
     Ok(Node::Number(value))
 }
 
-/// Reads a name, or the call of a function.
+/// Parses a name or a function call.
 fn named(input: &mut Input<'_>) -> ModalResult<Node> {
     let head = one_of(is_first_in_name);
     let tail = take_while(0.., is_in_name);
@@ -294,7 +294,7 @@ fn grouped(input: &mut Input<'_>) -> ModalResult<Node> {
 mod tests {
     use super::*;
 
-    /// The tree with every pair of operands in parentheses.
+    /// The tree as text, with every pair of operands in parentheses.
     fn shown(tree: &Tree) -> String {
         match &tree.node {
             Node::Number(value) => value.to_string(),
@@ -377,7 +377,7 @@ mod tests {
         }
     }
 
-    /// What other languages, and pens, write otherwise.
+    /// Notations of other languages, and of handwriting.
     #[test]
     fn habits_are_answered() {
         for (text, wanted) in [

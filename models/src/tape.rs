@@ -1,4 +1,4 @@
-//! Trees to one tape: constants folded, equal operations done once.
+//! Compiles trees to one tape: constants are folded, and equal operations occur once.
 
 use std::collections::HashMap;
 
@@ -9,10 +9,10 @@ use crate::MAX_OPERATIONS;
 use crate::names::nearest;
 use crate::syntax::{FUNCTIONS, Function, Node, Operator, PI, TIME, Tree};
 
-/// The place of a value on the tape: a variable, or the result of an operation.
+/// The position of a value on the tape: a variable, or the result of an operation.
 pub(crate) type Register = usize;
 
-/// An operation on registers. A number is kept as its bits, so that operations can be compared.
+/// An operation on registers. A number is stored as its bits, so that operations can be compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Operation {
     Constant(u64),
@@ -22,11 +22,11 @@ pub(crate) enum Operation {
     Divide(Register, Register),
     Negate(Register),
     Square(Register),
-    /// Plus a number.
+    /// Adds a number.
     Offset(Register, u64),
-    /// Times a number.
+    /// Multiplies by a number.
     Scale(Register, u64),
-    /// Over a number.
+    /// Divides by a number.
     Over(Register, u64),
     Sqrt(Register),
     Exp(Register),
@@ -37,9 +37,9 @@ pub(crate) enum Operation {
     Tanh(Register),
     /// Arc tangent of a, with 1 + a².
     Atan(Register, Register),
-    /// Angle of (x, y): the registers of y, of x and of x² + y².
+    /// The angle of (x, y): the registers of y, of x and of x² + y².
     Atan2(Register, Register, Register),
-    /// To the power of a number that is not a whole one.
+    /// Raises to the power of a number that is not an integer.
     Power(Register, u64),
     Abs(Register),
     Minimum(Register, Register),
@@ -47,7 +47,7 @@ pub(crate) enum Operation {
 }
 
 impl Operation {
-    /// The registers read, some of them twice.
+    /// The registers read; one may occur twice.
     pub(crate) fn reads(self) -> [Option<Register>; 3] {
         use Operation as O;
         match self {
@@ -80,14 +80,14 @@ impl Operation {
     }
 }
 
-/// An operation and the register of its first result; a second one follows it.
+/// An operation and the register of its first result; a second result follows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Step {
     pub(crate) operation: Operation,
     pub(crate) to: Register,
 }
 
-/// The operations that the registers `wanted` depend on, in order of the tape.
+/// The operations that the registers `wanted` depend on, in the order of the tape.
 pub(crate) fn needed(steps: &[Step], wanted: &[Register], registers: usize) -> Vec<Step> {
     let mut marked = vec![false; registers];
     for &register in wanted {
@@ -106,7 +106,7 @@ pub(crate) fn needed(steps: &[Step], wanted: &[Register], registers: usize) -> V
     kept
 }
 
-/// The value that a name stands for: a register, or a number.
+/// The meaning of a name: a register or a number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Value {
     Number(f64),
@@ -122,12 +122,12 @@ pub(crate) struct Tape {
 }
 
 impl Tape {
-    /// An empty tape; the first `variables` registers are given from outside.
+    /// An empty tape, whose first `variables` registers are inputs.
     pub(crate) fn new(variables: usize) -> Self {
         Self { steps: Vec::new(), registers: variables, known: HashMap::new() }
     }
 
-    /// Adds the operations of `tree`; `resolve` gives the value that a name stands for.
+    /// Adds the operations of `tree`; `resolve` gives the meaning of a name.
     ///
     /// # Errors
     ///
@@ -182,12 +182,12 @@ impl Record for Tape {
     }
 }
 
-/// Records operations one after the other, and puts operators and functions together from them.
+/// Records operations in sequence, and composes operators and functions from them.
 pub(crate) trait Record {
     /// The register of the first result of `operation`.
     fn done(&mut self, operation: Operation) -> Register;
 
-    /// The register with a value.
+    /// The register that holds a value.
     fn register(&mut self, value: Value) -> Register {
         match value {
             Value::Register(register) => register,
@@ -267,9 +267,9 @@ pub(crate) trait Record {
         }
     }
 
-    /// Whole powers by repeated multiplication, so that they are exact at 0 and for negative `a`.
+    /// Integer powers by repeated multiplication, so that they are exact at 0 and for negative `a`.
     fn power(&mut self, a: Value, exponent: f64) -> Value {
-        /// Largest whole exponent that is multiplied out.
+        /// The largest integer exponent that is expanded.
         const WHOLE: f64 = 64.0;
         if let Value::Number(a) = a {
             return Value::Number(elementary::powf(a, exponent));
@@ -342,7 +342,7 @@ fn number(function: Function, a: f64, b: f64) -> f64 {
         Function::Atan2 => elementary::atan2(a, b),
         Function::Abs => a.abs(),
         Function::Tanh => elementary::tanh(a),
-        // The scalar's own minimum: that of plain numbers passes over a value that is not a number.
+        // The minimum of [`Scalar`], since that of `f64` ignores a NaN.
         Function::Min => Scalar::min(a, b),
         Function::Max => Scalar::max(a, b),
     }
@@ -357,7 +357,7 @@ fn function(name: &str) -> Result<(Function, usize), String> {
     })
 }
 
-/// The message on a name `name` where only `known` ones, or the time, may stand.
+/// The message on a name `name` where only `known` names, and possibly the time, are allowed.
 pub(crate) fn unknown(name: &str, known: &[&str], allows_time: bool) -> String {
     if name == TIME && !allows_time {
         return "names t, the time, which a derivative does not depend on; a state with the derivative 1 does"

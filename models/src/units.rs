@@ -1,9 +1,9 @@
-//! Units of expressions, by their structure: only what is certainly wrong is refused.
+//! Checks the units of expressions by structure. Only what is certainly wrong is refused.
 //!
-//! A number may stand for any quantity: `-2 * v` is an acceleration where the 2 is meant in 1/s. So a product with a
-//! number has no known unit, and a sum with one has that of the other part. What a function gives, such as
-//! `cos(theta)`, has no unit in a product, but alone it may stand for any quantity, as a speed of 1 m/s that nobody
-//! wrote.
+//! A number may stand for any quantity: `-2 * v` is an acceleration if the 2 is meant in 1/s. So a product
+//! with a number has no known unit, and a sum with one has the unit of the other term. The value of a
+//! function, such as `cos(theta)`, has no unit in a product. Alone it may stand for any quantity, such as a
+//! speed whose factor of 1 m/s was not written.
 
 use std::fmt;
 
@@ -11,10 +11,10 @@ use punctual_core::elementary;
 
 use crate::syntax::{self, FUNCTIONS, Function, Node, Operator, PI, TIME, Tree};
 
-/// The base units in the order of a [`Unit`]'s exponents; angles have none.
+/// The base units in the order of a [`Unit`]'s exponents; angles are dimensionless.
 const BASE: [&str; 7] = ["kg", "m", "s", "A", "K", "mol", "cd"];
 
-/// Round-off of a factor, and of an exponent, in parts of 1.
+/// Relative round-off of a factor, and absolute of an exponent.
 const ROUND_OFF: f64 = 1e-9;
 
 /// A unit: powers of base units, times a factor.
@@ -22,30 +22,30 @@ const ROUND_OFF: f64 = 1e-9;
 pub struct Unit {
     /// Exponents of kg, m, s, A, K, mol and cd.
     exponents: [f64; 7],
-    /// Base units in one of it, > 0.
+    /// Number of base units in one of it, > 0.
     factor: f64,
-    /// How it was written, if it was.
+    /// The name it was written with, if any.
     name: Option<String>,
 }
 
 impl Unit {
-    /// The unit called `name` with these exponents of kg, m, s, A, K, mol and cd, and this many base units in one
-    /// of it.
+    /// The unit called `name` with these exponents of kg, m, s, A, K, mol and cd. `factor` is the number of
+    /// base units in one of it.
     pub fn new(name: &str, exponents: [i32; 7], factor: f64) -> Self {
         Self { exponents: exponents.map(f64::from), factor, name: Some(name.to_owned()) }
     }
 
-    /// Whether both measure the same quantity, in whatever scale.
+    /// Whether both measure the same quantity, in any scale.
     pub fn is_like(&self, other: &Self) -> bool {
         self.exponents.iter().zip(other.exponents).all(|(a, b)| (a - b).abs() < ROUND_OFF)
     }
 
-    /// How many of `other` one of this is.
+    /// How many of `other` one of this unit is.
     pub fn per(&self, other: &Self) -> f64 {
         self.factor / other.factor
     }
 
-    /// Whether both are the same but for their names.
+    /// Whether both are equal except for their names.
     pub fn is(&self, other: &Self) -> bool {
         self.is_like(other) && (self.per(other) - 1.0).abs() < ROUND_OFF
     }
@@ -86,12 +86,12 @@ impl fmt::Display for Unit {
     }
 }
 
-/// What is known of the unit of a part.
+/// What is known about the unit of a subexpression.
 #[derive(Clone, Debug)]
 enum Known {
     /// Nothing.
     Nothing,
-    /// It is made of numbers alone, which may stand for any quantity.
+    /// It consists only of numbers, which may stand for any quantity.
     Number,
     /// It is the value of a function.
     Value,
@@ -99,12 +99,12 @@ enum Known {
     Unit(Unit),
 }
 
-/// The unit of the expression `text` where it is known; `named` gives that of a name, where it is. The time is
-/// in s.
+/// The unit of the expression `text` if it is known; `named` gives that of a name, if known. The time is in
+/// s.
 ///
 /// # Errors
 ///
-/// Parts of different quantities or scales that are added or compared; a function of what has a unit.
+/// Terms of different quantities or scales that are added or compared; a function of an argument with a unit.
 pub fn unit_of(text: &str, named: &dyn Fn(&str) -> Option<Unit>) -> Result<Option<Unit>, String> {
     let tree = syntax::parse(text)?;
     match (Walk { text, named }).known(&tree)? {
@@ -177,12 +177,12 @@ impl Walk<'_> {
             }
             (Some(_), [Known::Number]) => Known::Number,
             (Some(_), [_]) => Known::Value,
-            // The tape tells of what is no function, or has another number of arguments.
+            // The tape reports unknown functions and wrong numbers of arguments.
             _ => Known::Nothing,
         })
     }
 
-    /// The unit of two parts that have to have the same.
+    /// The common unit of two terms that must have the same one.
     fn same(&self, trees: &[Tree], parts: [Known; 2]) -> Result<Known, String> {
         let [a, b] = match parts {
             [Known::Unit(a), Known::Unit(b)] => [a, b],
@@ -208,7 +208,7 @@ impl Walk<'_> {
     }
 }
 
-/// The value of an expression of numbers.
+/// The value of an expression that consists of numbers.
 fn number(tree: &Tree) -> Option<f64> {
     match &tree.node {
         Node::Number(value) => Some(*value),
@@ -241,7 +241,7 @@ mod tests {
             "th" => unit("rad", 0, 0, 1.0),
             "deg" => unit("deg", 0, 0, std::f64::consts::PI / 180.0),
             "km" => unit("km", 1, 0, 1e3),
-            // Of unknown unit: q.
+            // q has no known unit.
             _ => None,
         }
     }

@@ -1,4 +1,4 @@
-//! Models of expressions against the same models in Rust, on the jets of the core.
+//! Compares models given by expressions with the same models in Rust, on the jets of the core.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use punctual_core::plants::{Bicycle, KinematicBicycle, PointMass, SmallSlipBicyc
 use punctual_core::scalar::Scalar;
 use punctual_models::Model;
 
-/// A random expression: text for the one side, a tree for the other.
+/// A random expression: as text for one side, as a tree for the other.
 #[derive(Clone, Debug)]
 enum Tree {
     State(usize),
@@ -118,7 +118,7 @@ impl Barrier<2> for Tree {
     }
 }
 
-/// All that two sources give at one sample, as pairs of numbers.
+/// Everything that two sources give at one sample, as pairs of numbers.
 fn both(found: &dyn DerivativeSource, wanted: &dyn DerivativeSource, x: &[f64], u: &[f64]) -> Vec<[f64; 2]> {
     const T: f64 = 0.3;
     const AHEAD: f64 = 0.01;
@@ -187,7 +187,7 @@ fn disc() -> DistanceDisc {
     DistanceDisc::new([45.0, 44.0], 2.0, 2.0).expect("valid disc")
 }
 
-/// Compares at 50 states the model of these expressions with `plant`.
+/// Compares, at 50 states, the model of these expressions with `plant`.
 fn agrees<P, const NX: usize>(plant: P, names: ([&str; NX], [&str; 2]), derivatives: [&str; NX])
 where
     P: ControlAffine<NX, 2> + Copy + Send + Sync + 'static,
@@ -207,7 +207,7 @@ where
         let pairs = both(&*found, &*wanted, &x, &[0.7, -0.2]);
         let size = pairs.iter().map(|p| p[1].abs()).fold(1.0, f64::max);
         for (i, [found, wanted]) in pairs.into_iter().enumerate() {
-            // A few dozen roundings.
+            // Round-off of a few dozen operations.
             assert!((found - wanted).abs() <= 1e-14 * size, "{i}: {found} {wanted}");
         }
         let mut both = [x.clone(), x];
@@ -287,7 +287,8 @@ fn thirty_two_inputs() {
     }
 }
 
-/// What a barrier computes of the plant is what another one along it takes: every bit is that of its own.
+/// Barriers along one model share what is computed for the plant; the results are bitwise those of each
+/// barrier on its own.
 #[test]
 fn barriers_along_one_model_share_the_plant() {
     let model = |l_r| {
@@ -311,7 +312,7 @@ fn barriers_along_one_model_share_the_plant() {
         shared.evaluate_along(t, &*motion, &mut found);
         other.evaluate(t, &x, &mut wanted);
         assert_eq!(found, wanted);
-        // One Runge-Kutta step does for the first, and not for the second.
+        // One Runge–Kutta step suffices for the first duration, but not for the second.
         for duration in [1e-3, 1.5] {
             let (mut found, mut wanted) = (Ahead::ZERO, Ahead::ZERO);
             let u = [0.7, -0.4 * t.cos()];
@@ -323,7 +324,7 @@ fn barriers_along_one_model_share_the_plant() {
     }
 }
 
-/// Whether time matters to a barrier is known of all times at once.
+/// Whether a barrier depends on time is determined for all times together.
 #[test]
 fn what_depends_on_time_is_known() {
     let model = Model::new(&["x", "v"], &["u"], &[("c", 3.0)], &["v", "u"]).expect("a model");

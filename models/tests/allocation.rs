@@ -25,7 +25,7 @@ fn a_step_allocates_nothing() {
         let found = allocations(|| {
             for k in 0..500 {
                 let t = f64::from(k) * 0.01;
-                // Every fiftieth outside the domain of the logarithm.
+                // Every fiftieth sample is outside the domain of the logarithm.
                 let x = if k % 50 == 10 { -90.0 } else { 8.0 * t };
                 let report = filter.step(t, &[x, 7.0 * t, 0.7, 9.0], &[0.0; 2], &mut u).expect("the lengths");
                 seen[report.status as usize] = true;

@@ -1,4 +1,5 @@
-//! Models by code against the same models by expressions, bit for bit; and code that breaks its contract.
+//! Compares models in code with the same models in expressions, bit for bit; also code that breaks its
+//! contract.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -11,12 +12,12 @@ use punctual_models::evaluated::{Calculator, Code, CodeModel, Dimensions, LITERA
 const DIMENSIONS: Dimensions = Dimensions { states: 4, inputs: 2, barriers: 1 };
 const ANY: [[f64; 2]; 4] = [[f64::NEG_INFINITY, f64::INFINITY]; 4];
 
-/// The operation `name` of `a` and `b`.
+/// The result of the operation `name` on `a` and `b`.
 fn op(c: &mut dyn Calculator, name: &str, a: Number, b: Number) -> Number {
     c.apply(OPERATIONS.iter().position(|o| *o == name).expect("an operation") as u32, a, b, 0.0)
 }
 
-/// The operation `name` of `a` and the number `b`.
+/// The result of the operation `name` on `a` and the literal `b`.
 fn with(c: &mut dyn Calculator, name: &str, a: Number, b: f64) -> Number {
     c.apply(OPERATIONS.iter().position(|o| *o == name).expect("an operation") as u32, a, LITERAL, b)
 }
@@ -61,7 +62,7 @@ fn unicycle(c: &mut dyn Calculator, x: &[Number], f: &mut [Number], g: &mut [Num
 
 const DERIVATIVES: [&str; 4] = ["v*cos(th)", "v*sin(th)", "tanh(v)^2*w", "a"];
 
-/// A disc with two branches that are the same function.
+/// A disc with two branches that compute the same function.
 fn disc(c: &mut dyn Calculator, t: Number, x: &[Number]) -> Number {
     let (dx, dy) = (with(c, "subtract", x[0], 40.0), with(c, "subtract", x[1], 40.0));
     let squares = if c.value(x[0]) < 20.0 {
@@ -85,7 +86,7 @@ fn made(plant: Plant, barrier: Barrier) -> Result<CodeModel, String> {
         .map_err(|e| e.to_string())
 }
 
-/// A barrier with a cosine that the plant computes too, to an order less.
+/// A barrier with a cosine that the plant also computes, to one order less.
 fn shared(c: &mut dyn Calculator, t: Number, x: &[Number]) -> Number {
     let (slow, cos) = (with(c, "multiply", t, 0.1), op(c, "cos", x[2], 0));
     let sum = op(c, "add", x[3], cos);
@@ -94,7 +95,7 @@ fn shared(c: &mut dyn Calculator, t: Number, x: &[Number]) -> Number {
 
 const SHARED: &str = "v + cos(th) - t*0.1";
 
-/// The same by code and by expressions, of relative degree `n`.
+/// The same barrier in code and as an expression, with relative degree `n`.
 fn sources(barrier: Barrier, expression: &str, n: usize) -> [Box<dyn DerivativeSource>; 2] {
     let code = made(unicycle, barrier).expect("a model").barrier(0).expect("a barrier");
     let model = Model::new(&["x", "y", "th", "v"], &["a", "w"], &[], &DERIVATIVES).expect("a model");
@@ -113,7 +114,7 @@ fn code_gives_the_bits_of_expressions() {
     compare(sources(shared, SHARED, 1));
 }
 
-/// One value of what is known as many is no enclosure: asked for it, a model has none.
+/// Reading a single value of an interval gives no enclosure, so such a model has none.
 #[test]
 fn what_looks_at_plain_values_encloses_nothing() {
     let looking: Plant = |c, x, f, g| {
@@ -202,7 +203,7 @@ fn code_that_does_what_it_must_not_is_refused() {
         unicycle(c, x, f, g);
         f[3] = 4000;
     };
-    // The inputs are registers too, but nothing that the code was given.
+    // The inputs are registers too, but were not given to the code.
     let inputs: Plant = |c, x, f, g| {
         unicycle(c, x, f, g);
         f[3] = op(c, "sin", 4, 0);
@@ -235,7 +236,7 @@ fn code_that_does_what_it_must_not_is_refused() {
     }
 }
 
-/// A branch that no sample takes asks for more operations than there is room for: the result is not a number.
+/// A branch that no sample takes requests more operations than there is memory for, so the result is NaN.
 #[test]
 fn a_branch_that_is_too_long_is_a_status() {
     let branching: Barrier = |c, t, x| {

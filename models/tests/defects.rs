@@ -67,8 +67,8 @@ fn names_and_numbers_of_them() {
     assert_eq!(n.as_deref(), Some("relative_degree: is 9, must be 1 to 8"));
 }
 
-/// Long sums and products are trees as deep as long: they must not overflow a thread's stack. Too many different
-/// operations are refused before they are computed.
+/// Long sums and products give equally deep trees, which must not overflow a thread's stack. Too many
+/// different operations are refused before they are computed.
 #[test]
 fn size() {
     let long = vec!["v"; MAX_OPERATORS + 1].join("*");

@@ -1,10 +1,10 @@
-//! What is narrow between two samples, for plants and sets written as expressions.
+//! Features that are narrow between two samples, for plants and sets given by expressions.
 
 use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Sampling};
 use punctual_models::Model;
 
-/// Ditches of a tenth to a thousandth of a hold, and as narrow gusts that throw a vehicle into what it was clear of: no sample
-/// that crosses one is on course.
+/// Ditches with a width of a tenth to a thousandth of a hold, and equally narrow gusts that push a vehicle
+/// into a ditch it was clear of. No sample whose hold crosses one is on course.
 #[test]
 fn what_is_on_course_crosses_nothing_narrow() {
     let ditch = "1 - 2 * exp(-((p - at) / w)^2)";
@@ -16,7 +16,7 @@ fn what_is_on_course_crosses_nothing_narrow() {
             let (period, speed) = (0.02 + 0.08 * part(31), 5.0 + 10.0 * part(45));
             let width = period * speed * 10.0_f64.powf(-1.0 - 2.0 * part(17));
             let at = (20.0 + part(59)) * period * speed;
-            // It takes three times the energy that the vehicle has.
+            // The gust takes three times the energy that the vehicle has.
             let force =
                 3.0 * speed * speed / (2.0 * width * std::f64::consts::PI.sqrt()) + 3.0 * speed / width;
             let parameters = [("at", at), ("w", width), ("force", force)];

@@ -1,4 +1,5 @@
-//! Plans for plants written as expressions: accepted, and kept whatever is wanted; judged by an integrator of its own.
+//! Backup plans for plants given by expressions: what is accepted is kept whatever u_ref is, as judged by a
+//! separate integrator.
 
 #![expect(clippy::print_stdout, reason = "the figures of the search")]
 
@@ -6,7 +7,7 @@ use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Sampling};
 use punctual_core::lie::RelativeDegree;
 use punctual_models::Model;
 
-/// Numbers that are the same on every machine.
+/// Random numbers that are the same on every machine.
 struct Random(u64);
 
 impl Random {
@@ -21,7 +22,7 @@ impl Random {
 /// ẋ at x and u.
 type Rate<'a> = dyn Fn(&[f64], &[f64]) -> Vec<f64> + 'a;
 
-/// A plant twice: as expressions, and as code to judge by.
+/// A plant in two forms: as expressions, and as code for the judge.
 struct Case<'a> {
     period: f64,
     deadline: f64,
@@ -65,7 +66,8 @@ impl Case<'_> {
         }
     }
 
-    /// Whether a plan is found from `x`. What is promised is kept for `more` s after the deadline, with the `wanted` input.
+    /// Whether a plan is found from `x`. If so, asserts that the promises are kept until `more` s after the
+    /// deadline, with the input `wanted`.
     fn is_kept(&self, x: &[f64], more: f64, mut wanted: impl FnMut(f64, &[f64]) -> Vec<f64>) -> bool {
         const PARTS: u32 = 20;
         let (mut filter, mut x, mut u) = (self.filter(), x.to_vec(), vec![0.0; self.bounds.len()]);
@@ -96,7 +98,8 @@ impl Case<'_> {
 const LENGTH: f64 = 0.5;
 const GRAVITY: f64 = 9.81;
 
-/// A cart of 1 kg with a pole of `mass` upright, states x, theta, v, omega; by the `deadline` within 0.2 m of `target`.
+/// A cart of 1 kg with an upright pole of `mass`, states x, theta, v, omega; within 0.2 m of `target` by the
+/// `deadline`.
 fn cart_pole<R>([mass, deadline, target, force]: [f64; 4], judge: impl FnOnce(&Case<'_>) -> R) -> R {
     let acc = "(f + m * sin(theta) * (l * omega^2 - g * cos(theta))) / (1 + m * sin(theta)^2)";
     let alpha = format!("(g * sin(theta) - cos(theta) * {acc}) / l");
@@ -111,7 +114,8 @@ fn cart_pole<R>([mass, deadline, target, force]: [f64; 4], judge: impl FnOnce(&C
         barriers: &[("0.2^2 - (x - d)^2", 2, true), ("theta + 0.5", 2, false), ("0.5 - theta", 2, false)],
         bounds: &[[-force, force]],
         rate: &|x, u| {
-            // The equations of motion as they are, solved: the pole's mass is a point at its end.
+            // The exact equations of motion, solved for the accelerations; the pole's mass is a point at its
+            // end.
             let (sin, cos) = x[1].sin_cos();
             let [[a, b], [c, d]] = [[1.0 + mass, mass * LENGTH * cos], [cos, LENGTH]];
             let [p, q] = [u[0] + mass * LENGTH * x[3] * x[3] * sin, GRAVITY * sin];
@@ -131,7 +135,7 @@ fn a_cart_with_a_pole_gets_there_in_time_and_the_pole_stays_up() {
     });
 }
 
-/// From starts around, with pushes of all kinds; and with other poles, deadlines, places and bounds.
+/// Starts around the equilibrium, with all kinds of pushes; also other poles, deadlines, targets and bounds.
 #[test]
 fn a_cart_with_a_pole_is_promised_only_what_is_kept() {
     let starts = if std::env::var_os("PUNCTUAL_TABLES").is_some() { 100 } else { 3 };
@@ -159,7 +163,7 @@ fn a_cart_with_a_pole_is_promised_only_what_is_kept() {
                                 -force
                             }
                         }
-                        // To fell it.
+                        // Tries to make the pole fall.
                         _ => -force * x[1].signum(),
                     }]
                 })
@@ -171,9 +175,9 @@ fn a_cart_with_a_pole_is_promised_only_what_is_kept() {
     }
 }
 
-/// A quadrotor in a vertical plane with thrust and torque for inputs: 1 kg, 0.05 kg m². It is to be within 0.3 m of a place
-/// by the `deadline`, above 0.5 m, below 6 m, and leaning by 1 rad at most. The thrust enters the second derivative of the
-/// distance, the torque the fourth.
+/// A quadrotor in a vertical plane with thrust and torque as inputs: 1 kg, 0.05 kg m². It must be within 0.3
+/// m of a target by the `deadline`, above 0.5 m, below 6 m, and tilted by at most 1 rad. The thrust enters
+/// the second derivative of the distance, the torque the fourth.
 fn quadrotor<R>([x, z, deadline, thrust]: [f64; 4], judge: impl FnOnce(&Case<'_>) -> R) -> R {
     const INERTIA: f64 = 0.05;
     let states = ["x", "z", "theta", "v", "w", "omega"];
@@ -214,10 +218,10 @@ fn a_quadrotor_with_thrust_and_torque_is_promised_only_what_is_kept() {
         let is_kept = quadrotor(numbers, |case| {
             case.is_kept(&x, 2.0, |_, x| match seed % 5 {
                 0 => vec![random.between(0.0, 30.0), random.between(-2.0, 2.0)],
-                // Nothing at all: it falls.
+                // No input: it falls.
                 1 => vec![0.0, 0.0],
                 2 => vec![40.0, 4.0],
-                // To turn it over.
+                // Tries to turn it over.
                 3 => vec![numbers[3], 2.0 * x[2].signum()],
                 _ => vec![GRAVITY, 0.0],
             })
@@ -228,7 +232,7 @@ fn a_quadrotor_with_thrust_and_torque_is_promised_only_what_is_kept() {
     assert!(100 * accepted >= 80 * starts, "{accepted} of {starts} accepted");
 }
 
-/// The two links of `examples/models/arm-filter.toml`.
+/// The two-link arm of `examples/models/arm-filter.toml`.
 #[test]
 fn an_arm_comes_within_its_limits() {
     const P: [f64; 3] = [3.2, 0.9, 1.1];
@@ -264,7 +268,7 @@ fn an_arm_comes_within_its_limits() {
     }
 }
 
-/// That of `examples/models/quadrotor-filter.toml`, with bounds.
+/// The quadrotor of `examples/models/quadrotor-filter.toml`, with bounds.
 #[test]
 fn a_quadrotor_in_a_plane_gets_there_below_the_ceiling() {
     let states = ["x", "z", "theta", "v_x", "v_z", "omega", "thrust", "thrust_rate"];
@@ -298,8 +302,8 @@ fn a_quadrotor_in_a_plane_gets_there_below_the_ceiling() {
     }
 }
 
-/// A point on a line against a wind on a stretch of its way that is short beside that of a hold. Some winds take more speed
-/// than there is.
+/// A point on a line with a wind on a stretch of its path that is shorter than the distance of a hold. Some
+/// winds take more speed than the point has.
 #[test]
 fn a_wind_on_a_short_stretch_is_seen_wherever_it_blows() {
     let mut outcomes = [0; 2];
@@ -326,8 +330,8 @@ fn a_wind_on_a_short_stretch_is_seen_wherever_it_blows() {
     assert!(outcomes.iter().all(|n| *n > 0), "{outcomes:?}");
 }
 
-/// A point on a line that turns around, against drags with a kink where it does: nothing is known of what comes after a rate
-/// there, and its piece still ends.
+/// A point on a line that reverses, against drags with a kink at zero speed. No bound is known beyond the
+/// first rate there, but the search still ends.
 #[test]
 fn a_drag_with_a_kink_is_passed() {
     type Drag = fn(f64) -> f64;
@@ -356,7 +360,7 @@ fn a_drag_with_a_kink_is_passed() {
     }
 }
 
-/// An angle that jumps across the negative half of the axis, as the bearing of a point does.
+/// An angle that jumps across the negative half of the axis, like the bearing of a point.
 #[test]
 fn the_jump_of_an_angle_is_seen() {
     let mut accepted = 0;

@@ -1,7 +1,7 @@
-//! Text columns lined up.
+//! Aligns text columns.
 
-/// Text columns lined up: the first row is the header; columns marked `true` in `right` are set to
-/// the right.
+/// The rows as aligned text columns. The first row is the header; columns marked `true` in `right` are
+/// right-aligned.
 pub fn table(rows: &[Vec<String>], right: &[bool]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |c: usize| rows.iter().filter_map(|row| row.get(c)).map(|s| shown(s)).max().unwrap_or(0);
@@ -21,7 +21,7 @@ pub fn table(rows: &[Vec<String>], right: &[bool]) -> String {
     lines.join("\n")
 }
 
-/// Number of columns of a terminal that `cell` takes.
+/// Number of terminal columns that `cell` occupies.
 fn shown(cell: &str) -> usize {
     console::measure_text_width(cell)
 }

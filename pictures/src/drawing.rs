@@ -1,4 +1,4 @@
-//! From the plots of a system file and a recording to pictures.
+//! Draws pictures from the plots of a system file and a recording.
 
 use std::path::Path;
 
@@ -17,18 +17,18 @@ use punctual_fmu::text::labelled;
 use crate::outlines::{self, Outline, Reads};
 use crate::plot::{self, Disc, Mark, PathPlot, Scale, Series, Style, TimePlot};
 
-/// Percentiles between which [`Variant::Clipped`] shows values.
+/// The percentiles between which [`Variant::Clipped`] shows values.
 const BULK: (f64, f64) = (1.0, 99.0);
 
-/// Names of two states that are the axes of a plane.
+/// Names of pairs of states that are the axes of a plane.
 const PLANES: [[&str; 2]; 4] = [["x_p", "y_p"], ["x", "y"], ["px", "py"], ["p_x", "p_y"]];
 
-/// A picture, and what is drawn beneath it that no file can give.
+/// A picture, and sets drawn beneath it that a system file cannot specify.
 #[derive(Clone, Debug)]
 pub struct Drawing {
-    /// The picture, as a system file has it.
+    /// The picture, in the form of a system file.
     pub picture: Picture,
-    /// Sets beneath the paths of a plane, besides its discs.
+    /// Sets drawn beneath the paths of a plane, besides its discs.
     pub outlines: Vec<Outline>,
 }
 
@@ -38,8 +38,8 @@ impl From<Picture> for Drawing {
     }
 }
 
-/// The pictures of a system that asks for none: the paths where there is a plane, h with its lower bound for every filter,
-/// every input with its limits. Of the signals recorded alone.
+/// The default pictures of a system that asks for none: the paths if there is a plane, h with its lower bound
+/// for every filter, and every input with its limits. Only recorded signals are drawn.
 pub fn usual(system: &System, models: &[Model], outcome: &Outcome) -> Vec<Drawing> {
     let recorded = outcome.recording.columns();
     let components = parts(system, models);
@@ -85,15 +85,15 @@ pub fn usual(system: &System, models: &[Model], outcome: &Outcome) -> Vec<Drawin
     pictures
 }
 
-/// A component and what it is made of.
+/// A component and its model.
 pub struct Part<'a> {
     /// Its entry in the system file.
     pub component: &'a Component,
-    /// What it is made of.
+    /// The model it is made from.
     pub model: &'a Model,
 }
 
-/// Barriers of one filter with h in one unit.
+/// The barriers of one filter whose h has the same unit.
 pub struct Group {
     /// The name of their picture.
     pub name: String,
@@ -114,7 +114,7 @@ impl Part<'_> {
         format!("{}.{variable}", self.component.name)
     }
 
-    /// The name of a picture of this component alone, `what` it shows.
+    /// The name of a picture of only this component, which shows `what`.
     fn file(&self, what: &str) -> String {
         match self.component.name.as_str() {
             "filter" => what.to_owned(),
@@ -129,7 +129,7 @@ impl Part<'_> {
         self.component.start.get(variable).map_or(start, StartValue::number)
     }
 
-    /// The filter, where it is one of this program, with the start values of its entry.
+    /// The filter with the start values of its entry, if it is one of this program.
     pub fn filter(&self) -> Option<FilterConfiguration> {
         let mut filter = match self.model {
             Model::Own(own, _) => Some(own.configuration.clone()),
@@ -169,19 +169,20 @@ impl Part<'_> {
         groups
     }
 
-    /// The inputs that it hands out.
+    /// The inputs that it outputs.
     pub fn inputs(&self) -> Vec<&str> {
         let outputs = self.model.description().variables.iter().filter(|v| v.causality == Causality::Output);
         outputs.filter_map(|v| v.name.strip_prefix("u.")).collect()
     }
 
-    /// The lower and the upper limit of an input, where it has one.
+    /// The lower and the upper limit of an input, if it has them.
     pub fn limits(&self, input: &str) -> [Option<f64>; 2] {
         ["u_min", "u_max"]
             .map(|side| self.number(&format!("{side}.{input}")).filter(|limit| limit.abs() < UNBOUNDED))
     }
 
-    /// Where it is in a plane, as two signals; more than once where it moves several things. Each with its name.
+    /// Its positions in a plane, as pairs of signals with a name each. There are several if it moves several
+    /// things.
     pub fn places(&self) -> Vec<(String, [String; 2])> {
         let variables = &self.model.description().variables;
         let outputs = variables.iter().filter(|v| v.causality == Causality::Output);
@@ -197,8 +198,8 @@ impl Part<'_> {
             .collect()
     }
 
-    /// The outlines of its barriers that are expressions of the place alone, as far as they come near `ranges` of the plane; and
-    /// the names of those that read more than the place, and so have none.
+    /// The outlines of its barriers that are expressions of only the position, if they come near `ranges` of
+    /// the plane. Also the names of the barriers that read more than the position, and so have no outline.
     pub fn expressions(&self, ranges: [(f64, f64); 2]) -> (Vec<Outline>, Vec<String>) {
         let (mut outlines, mut left_out) = (Vec::new(), Vec::new());
         let Some(filter) = self.filter() else { return (outlines, left_out) };
@@ -211,7 +212,7 @@ impl Part<'_> {
             let found =
                 planes.iter().zip(&all).find(|(_, reads)| **reads == Reads::Place).map(|(plane, _)| plane);
             if let Some(plane) = found {
-                // A filter that runs can be built.
+                // A filter that has run can be built.
                 let outline = Outline::of_expression(&filter, index, (*plane, &rest), ranges);
                 outlines.extend(outline.ok().flatten());
             } else if all.contains(&Reads::More) {
@@ -221,7 +222,8 @@ impl Part<'_> {
         (outlines, left_out)
     }
 
-    /// The outlines of its barriers that stay where they are and are no discs. `size` is that of what else is in the plane.
+    /// The outlines of its barriers that do not move and are not discs. `size` is the size of everything else
+    /// in the plane.
     fn shapes(&self, size: f64) -> Vec<Outline> {
         let filter = self.filter();
         let shape = |section: &BarrierSection| {
@@ -236,7 +238,7 @@ impl Part<'_> {
         filter.iter().flat_map(|filter| &filter.barrier).filter_map(shape).collect()
     }
 
-    /// The discs of its barriers that stay where they are.
+    /// The discs of its barriers that do not move.
     fn discs(&self) -> Vec<DiscEntry> {
         let filter = self.filter();
         let sections = filter.iter().flat_map(|filter| &filter.barrier);
@@ -255,18 +257,18 @@ impl Part<'_> {
         sections.filter_map(disc).collect()
     }
 
-    /// The barrier with the first deadline.
+    /// The barrier with the earliest deadline.
     fn goal(&self) -> Option<String> {
         let variables = &self.model.description().variables;
         variables.iter().find_map(|v| v.name.strip_suffix(".deadline")).map(str::to_owned)
     }
 }
 
-/// The positions of two signals, given by name and unit, that are the axes of a plane; of all such pairs.
+/// The positions of pairs of signals, given by name and unit, that are the axes of a plane.
 fn planes(signals: &[(&str, Option<&str>)]) -> Vec<[usize; 2]> {
     let beside = |(x, unit): (&str, Option<&str>)| {
         let named = PLANES.iter().find(|axes| axes[0] == x).map(|axes| axes[1].to_owned());
-        // Such as xa and ya, or x and z: lengths whose names differ in that letter.
+        // Such as xa and ya, or x and z: lengths whose names differ only in that letter.
         let letters = ["y", "z"].map(|letter| x.replacen('x', letter, 1));
         let lengths = letters.into_iter().filter(|_| x.contains('x') && unit == Some("m"));
         named.into_iter().chain(lengths).find_map(|y| signals.iter().position(|other| *other == (&*y, unit)))
@@ -303,10 +305,10 @@ fn plane(parts: &[Part<'_>], recording: &Recording) -> Option<Drawing> {
         };
         let ranges = [reach(0, x), reach(1, y)];
         outlines.extend(parts.iter().flat_map(|part| part.expressions(ranges).0));
-        // What covers all else lies beneath.
+        // Unbounded sets are drawn first, beneath all others.
         outlines.sort_by_key(|outline| !outline.endless);
     }
-    // One word for all that is to be kept out of.
+    // All obstacles share one legend entry.
     let obstacles = outlines.iter_mut().filter(|outline| outline.obstacle).map(|outline| &mut outline.label);
     obstacles.for_each(String::clear);
     if let Some(first) = discs.iter_mut().find(|disc| disc.obstacle) {
@@ -317,7 +319,7 @@ fn plane(parts: &[Part<'_>], recording: &Recording) -> Option<Drawing> {
     let picture = Picture::Path(PathPicture {
         name: Some("path".to_owned()),
         title: None,
-        // With several vehicles it is not known whose arrival it is.
+        // With several vehicles, it is unknown whose arrival it is.
         arrival: arrival.filter(|_| more.is_empty()),
         x,
         y,
@@ -379,7 +381,7 @@ fn path(picture: &PathPicture, outlines: &[Outline], recording: &Recording) -> R
 }
 
 fn time(picture: &TimePicture, recording: &Recording) -> Result<TimePlot, Error> {
-    // What belongs together, such as a barrier's h and its profile, has one colour.
+    // Signals that belong together, such as a barrier's h and its profile, have the same colour.
     let stem = |signal: &str| signal.rsplit_once('.').map(|(stem, _)| stem.to_owned());
     let solid = picture.signals.iter().map(|signal| (signal, Style::Solid, None));
     let dashed = picture.dashed.iter().map(|signal| {
@@ -420,7 +422,7 @@ fn series(recording: &Recording, signal: &str) -> Result<Vec<f64>, Error> {
         .ok_or_else(|| Error::configuration("plot", format!("{signal} is not in the recording")))
 }
 
-/// `name (unit)`, where all signals share a unit.
+/// `name (unit)`, if all signals share a unit.
 fn axis_label(recording: &Recording, name: &str, signals: &[&String]) -> String {
     let unit = |signal: &&String| {
         recording.index_of(signal).and_then(|i| recording.columns()[i].unit.clone()).unwrap_or_default()

@@ -1,4 +1,4 @@
-//! Pictures of what [`punctual_cosim`] and the study found: plots, pages and reports.
+//! Pictures of results of [`punctual_cosim`] and the study: plots, pages and reports.
 //!
 //! Each module uses only modules above it:
 //!
@@ -11,7 +11,7 @@
 //! report               a run as a page, with an animation; a campaign as a page
 //! ```
 #![forbid(unsafe_code)]
-// Elementary functions are those of the core: clippy.toml.
+// Elementary functions come from the core: see clippy.toml.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 pub mod columns;

@@ -1,4 +1,4 @@
-//! The edges of safe sets in a plane: of a shape by its numbers, of an expression where h = 0.
+//! The edges of safe sets in a plane: those of a shape from its numbers, those of an expression where h = 0.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -10,11 +10,12 @@ use punctual_fmu::configuration::{BarrierSection, FilterConfiguration, Shape, me
 
 /// Points of the outline of a round shape.
 const CORNERS: usize = 96;
-/// Length of the line of a half-plane, in sizes of what else is in the plane.
+/// Length of the edge of a half-plane, as a multiple of the size of everything else in the plane.
 const FAR: f64 = 1e3;
-/// Cells along each side of the square in which h = 0 is looked for.
+/// Cells along each side of the square that is searched for h = 0.
 const CELLS: usize = 160;
-/// How far that square goes from the middle of the picture, in sizes of what else is in it.
+/// How far that square extends from the centre of the picture, as multiples of the size of everything else in
+/// it.
 const REACHES: [f64; 3] = [1.0, 2.0, 4.0];
 
 /// The edge of a set.
@@ -22,17 +23,18 @@ const REACHES: [f64; 3] = [1.0, 2.0, 4.0];
 pub struct Outline {
     /// Legend entry; empty for none.
     pub label: String,
-    /// Closed lines, each without its first point at its end. Inside is what lies in an odd number of them.
+    /// Closed lines, without repeating their first point. A point is inside if an odd number of lines
+    /// encloses it.
     pub rings: Vec<Vec<[f64; 2]>>,
-    /// Whether it is to be kept out of.
+    /// Whether it must be avoided.
     pub obstacle: bool,
-    /// Whether it goes on beyond its lines.
+    /// Whether it is unbounded.
     pub endless: bool,
 }
 
 impl Outline {
-    /// The outline of the shape of `section`, seen from its centre, whose numbers are `number`; `None` where the shape is
-    /// none in a plane. `size` is that of what else is in the plane.
+    /// The outline of the shape of `section`, relative to its centre; `number` gives its numbers. `None` if
+    /// the shape is not in a plane. `size` is the size of everything else in the plane.
     pub fn of_shape(
         section: &BarrierSection,
         number: impl Fn(&str) -> Option<f64>,
@@ -44,12 +46,12 @@ impl Outline {
             Shape::Obstacle { .. } => (round([number("radius")?; 2], 1.0), true),
             Shape::Ellipse { .. } => (round(pair("half_axes")?, 1.0), false),
             Shape::EllipticObstacle { .. } => (round(pair("half_axes")?, 1.0), true),
-            // (x/A)⁴ + (y/B)⁴ = 1, within the rectangle; the obstacle is enlarged until it contains it.
+            // (x/A)⁴ + (y/B)⁴ = 1, inside the rectangle; an obstacle is enlarged until the curve encloses it.
             Shape::Rectangle { .. } => (round(pair("half_sides")?, 0.5), false),
             Shape::RectangularObstacle { .. } => {
                 (round(pair("half_sides")?.map(|side| side * elementary::powf(2.0, 0.25)), 0.5), true)
             }
-            Shape::HalfPlane { .. } => (beside(pair("normal")?, FAR * size), false),
+            Shape::HalfPlane { .. } => (half_plane(pair("normal")?, FAR * size), false),
             Shape::AtMost { .. }
             | Shape::AtLeast { .. }
             | Shape::SpeedLimit { .. }
@@ -67,15 +69,16 @@ impl Outline {
         })
     }
 
-    /// The same with its centre at `centre`.
+    /// The same outline with its centre at `centre`.
     pub fn moved(mut self, [x, y]: [f64; 2]) -> Self {
         self.rings.iter_mut().flatten().for_each(|corner| *corner = [corner[0] + x, corner[1] + y]);
         self
     }
 
-    /// The outline of barrier `index` of `filter`, an expression of the place alone, in the square around `ranges` and beyond,
-    /// until all of it is seen, up to four times as large. The place is the states `plane`; the others have the values of `x`, which
-    /// do not matter. `None` where h = 0 is nowhere there.
+    /// The outline of barrier `index` of `filter`, an expression of only the position. The square around
+    /// `ranges` is enlarged, at most by a factor of four, until it contains the whole outline. The position
+    /// is the states `plane`; the others have the values of `x`, which do not matter. `None` if h = 0 does
+    /// not occur there.
     ///
     /// # Errors
     ///
@@ -101,7 +104,8 @@ impl Outline {
         Ok(found.map(|outline| Self { label: filter.barrier[index].name.clone(), ..outline }))
     }
 
-    /// The outline of the one barrier of `built` in the square that goes `reach` to each side from the middle of `ranges`.
+    /// The outline of the only barrier of `built`, in the square that extends by `reach` to each side from
+    /// the centre of `ranges`.
     fn within(
         built: &Filter,
         (plane, x): ([usize; 2], &[f64]),
@@ -125,7 +129,7 @@ impl Outline {
         }
         let side = CELLS + 1;
         let is_edge = |k: usize| [0, CELLS].contains(&(k % side)) || [0, CELLS].contains(&(k / side));
-        // Safe all around is the outside of an obstacle.
+        // If the whole border is safe, the set is the outside of an obstacle.
         let obstacle = values.iter().enumerate().all(|(k, h)| !is_edge(k) || *h >= 0.0);
         if obstacle {
             values.iter_mut().for_each(|h| *h = -*h);
@@ -137,7 +141,7 @@ impl Outline {
         Ok(Some(Self { label: String::new(), rings, obstacle, endless }))
     }
 
-    /// Its corners, unless it is endless.
+    /// Its corners, unless it is unbounded.
     pub fn points(&self) -> impl Iterator<Item = &[f64; 2]> {
         self.rings.iter().filter(|_| !self.endless).flatten()
     }
@@ -146,15 +150,15 @@ impl Outline {
 /// What an expression reads of the plane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reads {
-    /// Nothing of it.
+    /// Neither coordinate.
     Nothing,
-    /// The place, and no other state nor time.
+    /// The position, and no other state nor the time.
     Place,
-    /// The place, and something else that changes.
+    /// The position, and something else that changes.
     More,
 }
 
-/// What the barrier `section` of `filter` reads, where it is an expression. The place is the states `plane`.
+/// What the barrier `section` of `filter` reads if it is an expression. The position is the states `plane`.
 pub fn reads(filter: &FilterConfiguration, section: &BarrierSection, plane: [usize; 2]) -> Reads {
     let Shape::Expression { expression, .. } = &section.shape else { return Reads::Nothing };
     let states = filter.plant.states();
@@ -175,26 +179,27 @@ fn round([a, b]: [f64; 2], power: f64) -> Vec<[f64; 2]> {
     (0..CORNERS).map(corner).map(|(sin, cos)| [a * bent(cos), b * bent(sin)]).collect()
 }
 
-/// The side of a line through 0 to which `normal` shows, `far` long.
-fn beside(normal: [f64; 2], far: f64) -> Vec<[f64; 2]> {
+/// The side of a line through 0 to which `normal` points, of length `far`.
+fn half_plane(normal: [f64; 2], far: f64) -> Vec<[f64; 2]> {
     let length = elementary::hypot(normal[0], normal[1]);
     let [x, y] = normal.map(|part| part / length * far);
     vec![[-y, x], [y, -x], [y + x, -x + y], [-y + x, x + y]]
 }
 
-/// The closed lines around the points of a square grid, `side` to a row, whose value is ≥ 0, by marching squares. Around the
-/// grid, one step off, all is negative. A value that is no number is too.
+/// The closed lines around the points with values ≥ 0 of a square grid with `side` points per row, by
+/// marching squares. One step outside the grid, all values count as negative, and so does NaN.
 fn rings(values: &[f64], side: usize) -> Vec<Vec<[f64; 2]>> {
     let size =
         values.iter().copied().filter(|value| value.is_finite()).fold(1e-300, |a: f64, b| a.max(b.abs()));
-    // In the grid with its border.
+    // Indices include the border.
     let value = |[i, j]: [usize; 2]| {
         let within = (1..=side).contains(&i) && (1..=side).contains(&j);
         let value = if within { values[(j - 1) * side + i - 1] } else { -size };
         if value.is_nan() { -size } else { value.clamp(-size, size) }
     };
-    // Around each cell, counter-clockwise: a line leads from where the boundary leaves the set to where it enters it next, so
-    // that the set is to its left. An edge, from its lower end, is left in the one cell and entered in the other.
+    // Counter-clockwise around each cell, a line leads from where the boundary leaves the set to where it
+    // next enters the set, so that the set is to its left. Each edge, named by its lower end, is left in one
+    // cell and entered in the other.
     let mut next = BTreeMap::new();
     for j in 0..=side {
         for i in 0..=side {
@@ -236,13 +241,13 @@ mod tests {
     fn a_half_plane_is_where_its_normal_shows() {
         let normal = [3.0, 4.0];
         let side = |[x, y]: [f64; 2]| (x * normal[0] + y * normal[1]) / 5.0;
-        // Round-off of products of 10.
+        // Allows for round-off of products of 10.
         let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
-        let depths: Vec<f64> = beside(normal, 10.0).into_iter().map(side).collect();
+        let depths: Vec<f64> = half_plane(normal, 10.0).into_iter().map(side).collect();
         assert!(depths.iter().zip([0.0, 0.0, 10.0, 10.0]).all(|(a, b)| near(*a, b)), "{depths:?}");
     }
 
-    /// The area within closed lines, what runs clockwise taken off.
+    /// The area enclosed by lines; clockwise lines count negatively.
     fn area(rings: &[Vec<[f64; 2]>]) -> f64 {
         let cross = |(a, b): (&[f64; 2], &[f64; 2])| (a[0] * b[1] - a[1] * b[0]) / 2.0;
         rings.iter().map(|ring| ring.iter().zip(ring.iter().cycle().skip(1)).map(cross).sum::<f64>()).sum()
@@ -257,7 +262,7 @@ mod tests {
         assert_eq!(found.len(), 2);
         for [x, y] in found.iter().flatten() {
             let off = ((x - 50.0).hypot(y - 47.0) - 30.0).abs() - 10.0;
-            // The distance bends by 1/r over a cell.
+            // The distance function has curvature 1/r over a cell.
             assert!(off.abs() < 1.0 / (8.0 * 20.0), "{x} {y}: {off}");
         }
         let exact = TAU / 2.0 * (40.0_f64.powi(2) - 20.0_f64.powi(2));
@@ -266,12 +271,12 @@ mod tests {
 
     #[test]
     fn lines_close_along_the_border_and_at_a_saddle() {
-        // Everything: once around, within the step to the border.
+        // If everything is inside, one line runs around the grid, less than a step outside.
         let whole = rings(&[1.0; 9], 3);
         assert_eq!(whole.len(), 1);
         assert!((4.0..=16.0).contains(&area(&whole)), "{whole:?}");
         assert!(rings(&[-1.0; 9], 3).is_empty() && rings(&[f64::NAN; 9], 3).is_empty());
-        // Two corners that touch: two sets, or one; their lines are closed either way.
+        // Two touching corners form one set or two; the lines are closed either way.
         let saddle = rings(&[1.0, -1.0, -1.0, 1.0], 2);
         assert!(area(&saddle) > 0.0 && saddle.iter().all(|ring| ring.len() >= 4), "{saddle:?}");
     }

@@ -1,8 +1,8 @@
-//! Cost of a filter: the smallest number with which a closed loop works, such as an input bound or a deadline,
-//! and profiles and rates compared by it.
+//! Cost of a filter: the smallest number with which a closed loop works, such as an input bound or a
+//! deadline; profiles and rates compared by it.
 //!
-//! Both are found by running the closed loop. So they are facts about one start, one plant and one u_ref. They
-//! are also upper bounds: another filter may do with less.
+//! Both are found by running the closed loop, so they hold for one start, one plant and one u_ref. They are
+//! also upper bounds: another filter may need less.
 
 use crate::simulation::Schedule;
 use punctual_core::MAX_INPUTS;
@@ -14,18 +14,18 @@ use punctual_core::judge::{Interpolation, Judge, Judgement, PromiseState, Verdic
 /// A closed loop to run.
 #[derive(Clone, Copy)]
 pub struct Loop<'a> {
-    /// The plant; its states are the first of the filter's.
+    /// The plant; its states are the first ones of the filter's state.
     pub plant: &'a dyn DynPlant,
-    /// Time in s and the filter's state. The components behind the plant's states stay as they are.
+    /// Time in s and the filter's state. Components beyond the plant's states do not change.
     pub start: (f64, &'a [f64]),
-    /// Sampling and integration. h is looked at after each substep, and at the deadlines themselves.
+    /// Sampling and integration. h is evaluated after each substep, and at the deadlines themselves.
     pub schedule: Schedule,
-    /// Deadlines of the barriers, in s from the start; infinite where there is none.
+    /// Deadlines of the barriers, in s from the start; infinite for a barrier without one.
     pub deadlines: &'a [f64],
-    /// Time in s from the computation of an input until it acts, ≥ 0, at most a step. Until then the input before
-    /// it acts.
+    /// Time in s between the computation of an input and its effect, ≥ 0, at most a step. Until then the
+    /// previous input acts.
     pub delay: f64,
-    /// Time in s after the start from which a run ends as soon as a promise is broken.
+    /// Time in s after the start from which a broken promise ends the run.
     pub until: f64,
 }
 
@@ -34,15 +34,15 @@ pub struct Loop<'a> {
 pub struct Run {
     /// Whether no promise was broken, and each barrier had one.
     pub kept: bool,
-    /// Time in s from the start until the last barrier has first arrived; `None` where a barrier has not arrived.
+    /// Time in s from the start until all barriers have first arrived; `None` if one has not.
     pub arrival: Option<f64>,
-    /// Largest |u_i| of each input; zeros above the number of inputs.
+    /// Largest |u_i| of each input; zeros beyond the number of inputs.
     pub peak: [f64; MAX_INPUTS],
     /// Steps that did not meet every constraint.
     pub unmet: usize,
     /// Findings on each barrier.
     pub barriers: Vec<Seen>,
-    /// Smallest and largest value of each of the plant's states; not a number where one became so.
+    /// Smallest and largest value of each of the plant's states; NaN if the state ever became NaN.
     pub states: Vec<[f64; 2]>,
     /// The last instant in s.
     pub end: f64,
@@ -59,17 +59,17 @@ pub struct Seen {
     pub first_unmet: Option<f64>,
 }
 
-/// A closed loop on its way.
+/// A closed loop while it runs.
 struct Running<'a> {
     setting: &'a Loop<'a>,
     judges: Vec<Judge>,
     run: Run,
-    /// Scratch: h of each barrier.
+    /// Buffer for h of each barrier.
     h: Vec<f64>,
 }
 
 impl Running<'_> {
-    /// Takes a sample.
+    /// Evaluates a sample.
     fn sample(&mut self, t: f64, x: &[f64], u: &[f64], report: &Report) {
         let run = &mut self.run;
         let is_armed = report.status != Status::NotArmed;
@@ -91,7 +91,7 @@ impl Running<'_> {
         self.run.end = t;
     }
 
-    /// Takes an instant between two samples.
+    /// Evaluates an instant between two samples.
     fn instant(&mut self, filter: &Filter, t: f64, x: &[f64]) -> Result<(), Error> {
         if filter.report().status != Status::NotArmed {
             filter.barrier_values(t, x, &mut self.h)?;
@@ -106,7 +106,7 @@ impl Running<'_> {
 
     fn bound(&mut self, x: &[f64]) {
         for (ends, x) in self.run.states.iter_mut().zip(x) {
-            // A value that is not a number stays.
+            // NaN persists.
             if x.is_nan() || *x < ends[0] {
                 ends[0] = *x;
             }
@@ -121,7 +121,7 @@ impl Running<'_> {
         self.judges.iter().any(lost)
     }
 
-    /// Moves the plant over the period that begins at `t`; `last` is the input of the period before.
+    /// Moves the plant over the period that begins at `t`; `last` is the input of the previous period.
     fn advance(
         &mut self,
         filter: &Filter,
@@ -212,10 +212,10 @@ pub fn run(
     Ok(run)
 }
 
-/// A number between `low` and `high` (0 < low ≤ high) with which `works` is true, at most `1 + tolerance` times
-/// one with which it is not. Where `works` holds for all larger numbers too, that is the smallest. It is found by
-/// bisection of the ratio. `low` where it works there; `None` where it does not work at `high`, or the limits are
-/// not numbers as above.
+/// A number between `low` and `high` (0 < low ≤ high) for which `works` is true, at most `1 + tolerance`
+/// times one for which it is false. If `works` also holds for all larger numbers, that is the smallest one up
+/// to the tolerance. It is found by bisection of the ratio. `low` if it works; `None` if `high` does not
+/// work, or the limits are invalid.
 ///
 /// ```
 /// let found = punctual_reference::effort::smallest([1.0, 100.0], 1e-3, |x| Ok::<_, ()>(x >= 7.0));
@@ -251,7 +251,7 @@ pub fn smallest<E>(
     Ok(Some(high))
 }
 
-/// A profile and a rate to try.
+/// A combination of profile and rate to try.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {
     /// The profile.
@@ -260,8 +260,9 @@ pub struct Candidate {
     pub rate_times_deadline: f64,
 }
 
-/// Candidates of [`compare`]: both profiles with rates from slow to the default. Slower ones follow the profile
-/// less tightly, so that an error costs less at once. Faster ones ask for more input than the profile.
+/// Candidates of [`compare`]: both profiles, with rates from slow to the default. Slower rates follow the
+/// profile less tightly, so that an error costs less immediately. Faster ones require more input than the
+/// profile.
 pub const CANDIDATES: [Candidate; 8] = {
     const fn of(profile: ProfileKind, rate_times_deadline: f64) -> Candidate {
         Candidate { profile, rate_times_deadline }
@@ -280,7 +281,7 @@ pub const CANDIDATES: [Candidate; 8] = {
 };
 
 impl Candidate {
-    /// `settings` with this profile and rate in place of theirs.
+    /// `settings` with this profile and rate.
     pub fn applied(&self, settings: BarrierSettings) -> BarrierSettings {
         let rate = settings.deadline.map(|deadline| self.rate_times_deadline / deadline);
         BarrierSettings { profile: self.profile, rate, rates: None, ..settings }
@@ -292,17 +293,17 @@ impl Candidate {
 pub struct Rating {
     /// The candidate.
     pub candidate: Candidate,
-    /// Its peak input without a bound; `None` where its deadlines are not kept even then.
+    /// Its peak input without a bound; `None` if it misses its deadlines even then.
     pub peak: Option<f64>,
     /// The smallest bound on the input with which the deadlines are kept, to a hundredth.
     pub bound: Option<f64>,
 }
 
-/// Rates every one of `candidates`. `try_out(candidate, bound)` runs the closed loop with the input bounded to
+/// Rates all `candidates`. `try_out(candidate, bound)` runs the closed loop with the input bounded to
 /// ±`bound` (infinite: unbounded). It returns whether the deadlines are kept, and the peak input.
 ///
-/// The bound is looked for between `1e-2` of the peak and the peak itself, which the unbounded run has shown to
-/// be enough. Best first: by bound, then by peak.
+/// The bound is searched between `1e-2` of the peak and the peak itself, which the unbounded run has shown to
+/// suffice. Best first: by bound, then by peak.
 ///
 /// # Errors
 ///

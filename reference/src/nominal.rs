@@ -1,23 +1,24 @@
-//! Nominal controllers: a sensible u_ref, without any promise.
+//! Nominal controllers: a sensible u_ref, without any guarantee.
 //!
-//! A filter changes u_ref as little as its rows ask, so the nominal controller decides how a closed loop looks.
-//! With u_ref = 0 a point mass keeps its angular momentum about the goal. [`damping`] is the least that belongs
-//! into every loop; [`Heading`] drives to a goal.
+//! A filter changes u_ref as little as its rows require, so the nominal controller determines the character
+//! of a closed loop. With u_ref = 0, a point mass keeps its angular momentum about the goal. [`damping`] is
+//! the minimum that every loop needs; [`Heading`] drives to a goal.
 
 use punctual_core::elementary;
 use punctual_core::error::{Error, finite, positive};
 use punctual_core::scalar::Scalar;
 
-/// Damping: −gain · v for a velocity or speed v (m/s), in m/s²; `gain` in 1/s, 1 in the figures of the
-/// documentation. On the point mass for each component, on unicycle and bicycle for the acceleration.
+/// Damping: −gain · v for a velocity or speed v (m/s), in m/s². `gain` is in 1/s, 1 in the figures of the
+/// documentation. It applies to each component on the point mass, and to the acceleration on unicycle and
+/// bicycle.
 pub fn damping<S: Scalar>(v: S, gain: f64) -> S {
     v * -gain
 }
 
-/// Drives a vehicle to a goal in the plane. It turns towards the goal, or away from it where that is nearer, and
-/// then reverses. Its speed is in proportion to the distance, limited.
+/// Drives a vehicle to a goal in the plane. It turns towards the goal or, if that is the smaller turn, away
+/// from it, and then reverses. Its speed is proportional to the distance, up to a limit.
 ///
-/// With d the vector to the goal, φ the angle from the heading to ±d of least size and σ its sign,
+/// With d the vector to the goal, φ the smaller angle from the heading to ±d and σ the sign chosen,
 ///
 /// ```math
 /// \begin{aligned}
@@ -32,7 +33,7 @@ pub struct Heading {
     pub goal: [f64; 2],
     /// Speed per distance in 1/s, finite, > 0. Default 0.8.
     pub speed_gain: f64,
-    /// Largest speed aimed at, in m/s, finite, > 0. Default 15.
+    /// Largest target speed in m/s, finite, > 0. Default 15.
     pub speed_limit: f64,
     /// Acceleration per speed error in 1/s, finite, > 0. Default 1.
     pub acceleration_gain: f64,
@@ -47,10 +48,10 @@ pub struct Heading {
 }
 
 impl Heading {
-    /// Distance in m within which the direction to the goal is not followed any more.
+    /// Distance to the goal in m within which the heading is no longer controlled.
     const NEAR: f64 = 0.5;
 
-    /// The defaults towards `goal` (m).
+    /// The controller with default gains and limits, towards `goal` (m).
     pub fn towards(goal: [f64; 2]) -> Self {
         Self {
             goal,
@@ -64,7 +65,7 @@ impl Heading {
         }
     }
 
-    /// The same controller, its numbers checked.
+    /// The same controller, with its numbers checked.
     ///
     /// # Errors
     ///
@@ -82,18 +83,19 @@ impl Heading {
         Ok(self)
     }
 
-    /// The same controller towards a point from which the way to the goal is freer. Where the straight way from
-    /// `position` passes within `clearance` (m) of one of the discs (centre and radius in m), that point leads
-    /// past the first of them, on the side where the way is shorter. Within the clearance of that disc the way is
-    /// along its edge. Where no disc is in the way, the point is the goal itself.
+    /// The same controller towards a point from which the path to the goal is less obstructed. If the
+    /// straight line from `position` passes within `clearance` (m) of one of the discs (centre and radius in
+    /// m), that point leads past the first of them, on the side where the path is shorter. Within the
+    /// clearance of that disc, the path follows its edge. If no disc is in the way, the point is the goal
+    /// itself.
     ///
-    /// This is no plan: it looks at one disc after the other and can go back and forth between discs that
-    /// overlap.
+    /// This is no planner: it considers one disc after the other, and can alternate between overlapping
+    /// discs.
     pub fn around(self, position: [f64; 2], discs: &[([f64; 2], f64)], clearance: f64) -> Self {
         let mut goal = self.goal;
-        // The way past one disc can lead to another; at worst each of them is passed once.
+        // The path around one disc can lead to another; each is passed at most once.
         for _ in discs {
-            match first_in_the_way(position, goal, discs, clearance) {
+            match first_on_the_line(position, goal, discs, clearance) {
                 Some((to, wide)) => goal = past(position, goal, to, wide),
                 None => break,
             }
@@ -108,7 +110,7 @@ impl Heading {
         let per_distance = if self.speed_gain * far >= self.speed_limit {
             S::from(self.speed_limit) / distance
         } else if far > 0.0 {
-            // The gain, as computed from speed and distance, with their round-off.
+            // The gain computed from speed and distance, with their round-off.
             S::from(self.speed_gain * far / far)
         } else {
             S::from(self.speed_gain)
@@ -136,9 +138,9 @@ impl Heading {
         [within(self.acceleration_limit, acceleration), within(self.turn_limit, angle * self.turn_gain)]
     }
 
-    /// Acceleration (m/s²) and slip angle (rad) of the bicycle with θ̇ = vβ/l_r, x = (x_p, y_p, θ, v); `l_r` > 0
-    /// in m. At rest it cannot turn: the slip angle is then on its limit, on the side that turns the right way
-    /// once it moves.
+    /// Acceleration (m/s²) and slip angle (rad) of the bicycle with θ̇ = vβ/l_r, x = (x_p, y_p, θ, v); `l_r`
+    /// > 0 in m. At rest it cannot turn. The slip angle is then at its limit, on the side that turns the
+    /// right way once it moves.
     pub fn bicycle<S: Scalar>(&self, x: &[S; 4], l_r: f64) -> [S; 2] {
         let [acceleration, turning] = self.unicycle(x);
         let at_rest = x[3].value() == 0.0;
@@ -146,7 +148,7 @@ impl Heading {
         if at_rest && turning.value() == 0.0 {
             return [acceleration, S::zero()];
         }
-        // Adding 0.0 makes 0 of −0.
+        // Adding 0.0 turns −0 into 0.
         [acceleration, within(self.slip_limit, turning * l_r / v + 0.0)]
     }
 
@@ -160,43 +162,43 @@ impl Heading {
     }
 }
 
-/// The first of the discs within `clearance` of the straight way from `position` to `goal`: the vector to its
-/// centre, and its radius with the clearance.
-fn first_in_the_way(
+/// The first of the discs within `clearance` of the straight line from `position` to `goal`: the vector to
+/// its centre, and its radius with the clearance.
+fn first_on_the_line(
     position: [f64; 2],
     goal: [f64; 2],
     discs: &[([f64; 2], f64)],
     clearance: f64,
 ) -> Option<([f64; 2], f64)> {
-    let way = [goal[0] - position[0], goal[1] - position[1]];
-    let length = elementary::hypot(way[0], way[1]);
+    let line = [goal[0] - position[0], goal[1] - position[1]];
+    let length = elementary::hypot(line[0], line[1]);
     let (mut first, mut found) = (f64::INFINITY, None);
     for &(centre, radius) in discs {
         let to = [centre[0] - position[0], centre[1] - position[1]];
-        // Position of the centre along the way, and beside it: > 0 to the left.
-        let ahead = (way[0] * to[0] + way[1] * to[1]) / length;
-        let beside = (way[0] * to[1] - way[1] * to[0]) / length;
+        // Position of the centre along the line, and across it: > 0 to the left.
+        let ahead = (line[0] * to[0] + line[1] * to[1]) / length;
+        let across = (line[0] * to[1] - line[1] * to[0]) / length;
         let wide = radius + clearance;
-        if ahead > 0.0 && ahead - wide < length && beside.abs() < wide && ahead < first {
+        if ahead > 0.0 && ahead - wide < length && across.abs() < wide && ahead < first {
             (first, found) = (ahead, Some((to, wide)));
         }
     }
     found
 }
 
-/// A point on the way past a disc whose centre is at `to` from `position`, on the side where the way to `goal` is
-/// shorter. From outside it is where a tangent from `position` touches the disc of radius `wide`, a little
-/// enlarged. From within that, it is as far again along the edge and a little outwards.
+/// A point past a disc whose centre is at `to` from `position`, on the side where the path to `goal` is
+/// shorter. From outside, it is the point where a tangent from `position` touches the slightly enlarged disc
+/// of radius `wide`. From inside, it is one radius further along the edge and slightly outwards.
 fn past(position: [f64; 2], goal: [f64; 2], to: [f64; 2], wide: f64) -> [f64; 2] {
-    /// Factor on the radius, so that the disc is not in the way of a vehicle that passes it.
+    /// Factor on the radius, so that a vehicle passing the disc is not blocked by it.
     const ENLARGED: f64 = 1.1;
-    /// Sine of the angle, outwards from the edge, of the way from within the disc.
+    /// Sine of the outward angle from the edge for a path from inside the disc.
     const OUTWARDS: f64 = 0.3;
-    let way = [goal[0] - position[0], goal[1] - position[1]];
-    // A disc on the left is passed on its right side.
-    let side = if way[0] * to[1] - way[1] * to[0] > 0.0 { -1.0 } else { 1.0 };
+    let line = [goal[0] - position[0], goal[1] - position[1]];
+    // A disc on the left is passed on the right.
+    let side = if line[0] * to[1] - line[1] * to[0] > 0.0 { -1.0 } else { 1.0 };
     let (distance, out) = (elementary::hypot(to[0], to[1]), ENLARGED * wide);
-    // The point, along the line to the centre and to the left of it.
+    // The point in coordinates along the line to the centre and to the left of it.
     let [along, across] = if distance > out {
         let [sin, cos] = [out / distance, (1.0 - elementary::powi(out / distance, 2)).sqrt()];
         [distance * cos * cos, distance * cos * sin * side]
@@ -207,7 +209,7 @@ fn past(position: [f64; 2], goal: [f64; 2], to: [f64; 2], wide: f64) -> [f64; 2]
     [position[0] + along * unit[0] - across * unit[1], position[1] + along * unit[1] + across * unit[0]]
 }
 
-/// `value` moved into ±`limit`.
+/// `value` clamped to ±`limit`.
 fn within<S: Scalar>(limit: f64, value: S) -> S {
     match value.value() {
         v if v > limit => S::from(limit),
@@ -223,7 +225,7 @@ mod tests {
     #[test]
     fn turns_the_short_way_and_reverses() {
         let heading = Heading::towards([10.0, 0.0]).validated().expect("valid");
-        // Facing the goal, facing away from it, and with it to the left and right.
+        // Facing the goal, facing away from it, and with the goal to the left and right.
         assert_eq!(heading.unicycle(&[0.0, 0.0, 0.0, 0.0]), [8.0, 0.0]);
         let [a, turn] = heading.unicycle(&[0.0, 0.0, std::f64::consts::PI, 0.0]);
         assert!(a < -7.9 && turn.abs() < 1e-12);
@@ -250,7 +252,7 @@ mod tests {
         }
     }
 
-    /// In every quadrant, within and beyond the limits, and for the point mass at the goal itself.
+    /// In every quadrant, inside and beyond the limits, and for the point mass at the goal itself.
     #[test]
     fn derivatives_are_those_of_the_laws() {
         use punctual_core::jet::Tangent;
@@ -271,12 +273,12 @@ mod tests {
             let found = [heading.point_mass(&x), heading.unicycle(&x), heading.bicycle(&x, 2.0)];
             let step = 1e-6;
             let (plus, minus) = (laws(&moved(step)), laws(&moved(-step)));
-            // The speed of a vehicle that has a heading has a kink at the goal.
+            // The speed of a vehicle with a heading has a kink at the goal.
             let compared = if i == 5 { 1 } else { 3 };
             for law in 0..compared {
                 for k in 0..2 {
                     let wanted = (plus[law][k] - minus[law][k]) / (2.0 * step);
-                    // Round-off of numbers of order 10 over the step.
+                    // Round-off of numbers of order 10, relative to the step.
                     let error = (found[law][k].directional - wanted).abs();
                     assert!(error < 1e-6 * (1.0 + wanted.abs()), "state {i}, law {law}: {found:?} {wanted}");
                 }
@@ -284,7 +286,7 @@ mod tests {
         }
     }
 
-    /// Tests starts all around a disc, some within its clearance: the way to the point is free of it.
+    /// From starts all around a disc, some within its clearance, the line to the point does not cross it.
     #[test]
     fn the_way_around_a_disc_is_free() {
         let (disc, clearance) = (([10.0, 1.0], 2.0), 1.0);
@@ -294,12 +296,12 @@ mod tests {
             let (angle, distance) = (f64::from(k) * 0.31, 2.05 + 0.04 * f64::from(k));
             let from = [disc.0[0] + distance * angle.cos(), disc.0[1] + distance * angle.sin()];
             let goal = heading.around(from, &[disc], clearance).goal;
-            // The point of the way that is nearest to the centre.
-            let way = [goal[0] - from[0], goal[1] - from[1]];
+            // The point of the line that is closest to the centre.
+            let line = [goal[0] - from[0], goal[1] - from[1]];
             let to = [disc.0[0] - from[0], disc.0[1] - from[1]];
-            let part = (way[0] * to[0] + way[1] * to[1]) / (way[0] * way[0] + way[1] * way[1]);
+            let part = (line[0] * to[0] + line[1] * to[1]) / (line[0] * line[0] + line[1] * line[1]);
             let part = part.clamp(0.0, 1.0);
-            let near = (to[0] - part * way[0]).hypot(to[1] - part * way[1]);
+            let near = (to[0] - part * line[0]).hypot(to[1] - part * line[1]);
             let free = f64::min(distance, disc.1 + clearance);
             assert!(near >= free - 1e-9, "{near} from {from:?} to {goal:?}");
         }

@@ -1,4 +1,4 @@
-//! Closed loops in process, for studies and tests: a filter, a plant integrated by RK4, held inputs.
+//! Closed loops in process, for studies and tests: a filter and a plant integrated by RK4, with held inputs.
 
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::error::{Error, positive};
@@ -7,7 +7,7 @@ use punctual_core::filter::{Filter, Report};
 /// Step size and length of a closed-loop run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Schedule {
-    /// Sampling period in s, finite, > 0: the input is held over it.
+    /// Sampling period in s, finite, > 0; the input is held over it.
     pub step: f64,
     /// Number of sampling periods.
     pub steps: usize,
@@ -15,9 +15,9 @@ pub struct Schedule {
     pub substeps: usize,
 }
 
-/// Runs `filter` and `plant` in closed loop from `x0` at time 0. At every sample `nominal(t, x)` gives u_ref, and
-/// `observe(t, x, u, report)` sees the result before the plant moves. It is called once more at the end. Sample k
-/// is at time k · step.
+/// Runs `filter` and `plant` in closed loop from `x0` at time 0. At every sample, `nominal(t, x)` gives
+/// u_ref, and `observe(t, x, u, report)` sees the result before the plant moves. It is called once more at
+/// the end. Sample k is at time k · step.
 ///
 /// # Errors
 ///
@@ -36,8 +36,8 @@ where
     closed_loop_by(filter, |x, u, dt| rk4_step(plant, x, u, dt), x0, schedule, nominal, observe)
 }
 
-/// Runs like [`closed_loop`], with a plant that moves by `advance(x, u, dt)` over `dt` seconds, for other ways to
-/// integrate.
+/// Like [`closed_loop`], but the plant moves by `advance(x, u, dt)` over `dt` seconds, which allows other
+/// integrators.
 ///
 /// # Errors
 ///

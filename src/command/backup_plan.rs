@@ -1,4 +1,4 @@
-//! The backup plan of `check`: whether one within the bounds keeps every promise, whatever u_ref is.
+//! The backup plan in `check`: whether some plan within the bounds keeps every promise, whatever u_ref is.
 
 use std::path::Path;
 
@@ -12,33 +12,33 @@ use super::closed_loop::LoopReport;
 use super::map;
 use crate::output::{self, number, number_above, number_below};
 
-/// The finding on plans from the start.
+/// The finding on backup plans from the start.
 #[derive(Serialize)]
 pub(super) struct BackupPlanReport {
     /// Whether a plan was found and checked.
     pub(super) found: bool,
-    /// Whether there certainly is none.
+    /// Whether there certainly is no plan.
     #[serde(skip)]
     vain: bool,
-    /// What no plan accounts for yet, or what the nearest one fails at.
+    /// What prevents plans altogether, or why the closest plan fails.
     #[serde(skip_serializing_if = "Option::is_none")]
     reason: Option<String>,
-    /// Where none ends at an equilibrium, a `plan_horizon` in s with which there is one, and the time in s until which that
-    /// keeps every promise.
+    /// If no plan ends at an equilibrium: a `plan_horizon` in s with which there is a plan, and the time in s
+    /// until which that plan keeps every promise.
     #[serde(skip_serializing_if = "Option::is_none")]
     in_motion: Option<[f64; 2]>,
-    /// Barriers that are not promised from there: soft, outside without a deadline, or let go before it.
+    /// Barriers not promised from there: soft, outside without a deadline, or released before it.
     left_out: Vec<String>,
-    /// Whether a barrier has a deadline, so that later ones were tried.
+    /// Whether a barrier has a deadline, so that other deadlines were tried.
     #[serde(skip)]
     has_deadline: bool,
-    /// The least factor of all deadlines with which a plan was found.
+    /// The least factor on all deadlines for which a plan was found.
     earliest_factor: Option<f64>,
     /// The earliest deadlines in s, by barrier.
     earliest: Vec<(String, f64)>,
-    /// The plan with the configured deadlines, or else with the earliest.
+    /// The plan with the configured deadlines, or otherwise with the earliest ones.
     plan: Option<PlanReport>,
-    /// Pictures of it.
+    /// The pictures of the plan.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     files: Vec<String>,
 }
@@ -50,14 +50,14 @@ struct PlanReport {
     at_equilibrium_from: Option<f64>,
     /// Time in s until which it keeps every promise, if it ends in motion.
     until: Option<f64>,
-    /// The largest size of each input, with its unit and bounds.
+    /// The largest magnitude of each input, with its unit and bounds.
     inputs: Vec<(String, f64, String, [f64; 2])>,
-    /// The barrier with the least h above its margin, the time in s, and that h.
+    /// The barrier with the least h above its margin, the time in s, that difference, and its unit.
     tightest: Option<(String, f64, f64, String)>,
 }
 
-/// The finding for the start `x0`, from which the closed loop `run` was, whose plan is drawn into the folder `out` if there is one; `None` where an input has no
-/// bounds, so that nothing is ruled out.
+/// The finding for the start `x0`, from which the closed loop `run` started. The plan is drawn to the folder
+/// `out`, if given. `None` if an input has no bounds, so that nothing is ruled out.
 pub(super) fn find(
     c: &FilterConfiguration,
     x0: &[f64],
@@ -115,7 +115,8 @@ pub(super) fn find(
     let left_out = c.barrier.iter().zip(planning.promised(t, x0)).filter(|(_, promised)| !promised);
     let left_out = left_out.map(|(barrier, _)| barrier.name.clone()).collect();
     let reason = configured.as_ref().err().map(|failure| c.refusal(*failure));
-    // Where the closed loop followed plans in the model, its inputs and the backup plan then are one as well.
+    // If the closed loop followed plans on the model, its inputs followed by the backup plan are a plan as
+    // well.
     let run = run.filter(|run| !run.by_rows && c.run.simulated.is_none());
     let deadlines = |factor: f64| {
         let given = c.barrier.iter().enumerate().filter_map(|(i, b)| {
@@ -143,7 +144,7 @@ pub(super) fn find(
     }))
 }
 
-/// The earliest deadlines with a plan from `x0`, for a promise that was refused, in a line.
+/// One line with the earliest deadlines that have a plan from `x0`, for a refused promise.
 pub(super) fn in_time(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<String>, Error> {
     let has_deadline = c.barrier.iter().any(|barrier| barrier.deadline.is_some());
     let filter = c.assured(c.build()?).ok().filter(|_| has_deadline);
@@ -163,7 +164,8 @@ pub(super) fn in_time(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<Stri
     Ok(Some(line))
 }
 
-/// A `plan_horizon` for a file that has none, as long as its latest deadline, and until when there is a plan with it.
+/// A `plan_horizon` for a file without one, as long as its latest deadline, and the time until which there is
+/// a plan with it.
 fn in_motion(c: &FilterConfiguration, x0: &[f64]) -> Option<[f64; 2]> {
     if c.plan_horizon.is_some() {
         return None;
@@ -183,17 +185,17 @@ impl BackupPlanReport {
         self.found && self.covers(barrier)
     }
 
-    /// Whether a plan has to keep the promise of `barrier`.
+    /// Whether a plan must keep the promise of `barrier`.
     pub(super) fn covers(&self, barrier: &str) -> bool {
         self.left_out.iter().all(|name| name != barrier)
     }
 
-    /// Time in s until which the plan keeps what it does, if it ends in motion.
+    /// Time in s until which the plan keeps its promises, if it ends in motion.
     pub(super) fn until(&self) -> Option<f64> {
         self.plan.as_ref()?.until
     }
 
-    /// The earliest deadline of `barrier` in s with a plan.
+    /// The earliest deadline of `barrier` in s that has a plan.
     pub(super) fn earliest_deadline(&self, barrier: &str) -> Option<f64> {
         self.earliest.iter().find(|(name, _)| name == barrier).map(|(_, deadline)| *deadline)
     }

@@ -1,4 +1,4 @@
-//! `punctual build`: a configuration becomes an FMU, a system file an SSP package.
+//! `punctual build`: turns a configuration into an FMU, and a system file into an SSP package.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -63,8 +63,7 @@ enum Versions {
 ///
 /// # Errors
 ///
-/// A configuration that cannot be used, a file that cannot be read or written, a product that does
-/// not work.
+/// A configuration that cannot be used, a file that cannot be read or written, an FMU that does not work.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let file = &arguments.configuration;
     if arguments.output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("ssp")) {
@@ -93,14 +92,14 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     for fmi in versions {
         let configuration = configuration.clone().for_fmi(fmi, experiment.arrays && !arguments.scalars);
         let beside = several && fmi == FmiVersion::Three;
-        let output = if beside { beside_it(&arguments.output) } else { arguments.output.clone() };
+        let output = if beside { next_to(&arguments.output) } else { arguments.output.clone() };
         build(configuration, &arguments.libraries, &output)?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
-/// The file for FMI 3.0 beside the one for 2.0.
-fn beside_it(file: &Path) -> PathBuf {
+/// The file for FMI 3.0 next to the one for 2.0.
+fn next_to(file: &Path) -> PathBuf {
     let mut name = file.file_stem().unwrap_or_default().to_owned();
     name.push("-fmi3.");
     name.push(file.extension().unwrap_or("fmu".as_ref()));
@@ -133,7 +132,7 @@ pub struct TryPluginArguments {
     folder: PathBuf,
 }
 
-/// The part of reading a configuration that may crash.
+/// Reads a configuration; this part may crash.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! `punctual campaign`: many runs of a system from what a campaign file draws.
+//! `punctual campaign`: many runs of a system with the values that a campaign file draws.
 
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use super::run::stem;
 use crate::codes::INTERRUPTED;
 use crate::output::{self, Counter, number};
 
-/// Lines of a list that are printed at once.
+/// Number of lines of a list that are printed together.
 const AT_ONCE: usize = 1000;
 
 /// Arguments of `punctual campaign`.
@@ -95,7 +95,7 @@ impl Arguments {
 /// A part of a campaign, as `--shard` names it.
 #[derive(Clone, Copy, Debug)]
 enum Shard {
-    /// The K-th of N, K from 1.
+    /// Part K of N, with K from 1.
     Part(u64, u64),
     Runs(Range),
 }
@@ -112,7 +112,7 @@ fn shard(text: &str) -> Result<Shard, String> {
 }
 
 impl Shard {
-    /// Its runs, of so many.
+    /// The runs of this part, out of `all`.
     fn runs(self, all: u64) -> Result<std::ops::Range<u64>, Error> {
         let wrong = |message: String| Error::configuration("--shard", message);
         match self {
@@ -120,7 +120,7 @@ impl Shard {
                 Err(wrong(format!("is one of {of} parts, must be of at most {all}, the number of runs")))
             }
             Self::Part(part, of) => {
-                // At most 2^53 of each.
+                // Both factors are at most 2^53.
                 let end = |part: u64| (u128::from(all) * u128::from(part) / u128::from(of)) as u64;
                 Ok(end(part - 1)..end(part))
             }
@@ -131,7 +131,7 @@ impl Shard {
         }
     }
 
-    /// What its file's name ends in.
+    /// The ending of its file's name.
     fn ending(self) -> String {
         match self {
             Self::Part(part, of) => format!("{part}-of-{of}.parquet"),
@@ -140,7 +140,7 @@ impl Shard {
     }
 }
 
-/// A run as `--list` shows it.
+/// A run as shown by `--list`.
 #[derive(Serialize)]
 struct Drawn<'a> {
     run: u64,
@@ -156,12 +156,12 @@ struct Report {
     complete: bool,
     done: u64,
     runs: u64,
-    /// Of a shard: its first run and the next one after it.
+    /// For a shard: its first run and the one after its last.
     #[serde(skip_serializing_if = "Option::is_none")]
     shard: Option<[u64; 2]>,
     wall_time: f64,
     runs_per_second: f64,
-    /// The page and the picture, where they are asked for.
+    /// The page and the picture, if requested.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     report: Vec<String>,
     #[serde(flatten)]
@@ -178,7 +178,7 @@ struct RareReport {
     found: Rare,
 }
 
-/// Makes the missing runs, and sums up.
+/// Makes the missing runs, and summarises the results.
 ///
 /// # Errors
 ///
@@ -198,7 +198,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         return list(arguments, &campaign, range);
     }
     if let Some(path) = &arguments.pack {
-        // What --pack wrote before may be written again, and nothing else.
+        // Only a file that --pack wrote may be overwritten.
         if path.exists() && std::fs::read(path).map_or(true, |bytes| !bytes.starts_with(b"{\n  \"version\""))
         {
             let message =
@@ -226,7 +226,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         );
         return Err(Error::configuration("--output", message));
     }
-    // A second Ctrl-C ends the program at once, since the kept rows are safe.
+    // A second Ctrl-C ends the program immediately, since the rows kept are safe.
     let stop = super::interruption()?;
     // Run.
     let all = runs.as_ref().map_or(campaign.runs(), |runs| runs.end - runs.start);
@@ -239,12 +239,12 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         Progress { done: all, before: 0, again: 0, wall_time: Duration::ZERO }
     };
 
-    // Sum up.
+    // Summarise.
     let complete = progress.done == all;
     let (mut summary, mut pages) = (None, Vec::new());
     let reader = match complete {
         true if runs.is_none() => Some(campaign::recorded(&output)?.0),
-        // The page of what there is.
+        // The page of the runs so far.
         false if arguments.report => campaign::kept(&campaign, &output)?,
         _ => None,
     };
@@ -268,7 +268,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         report: pages,
         summary,
     };
-    // Tell.
+    // Report.
     if progress.before > 0 {
         output::note(&format!("note: {} of {all} runs already existed", progress.before));
     }
@@ -406,7 +406,7 @@ fn rare(arguments: &Arguments, campaign: &Campaign, repeats: usize) -> Result<Ex
     Ok(ExitCode::SUCCESS)
 }
 
-/// Where h counts, for runs without one that does.
+/// When h counts, for runs in which it never does.
 fn counts(campaign: &Campaign) -> String {
     format!(
         "it does from the deadline on (stop_time = {} s), or from the start where a run begins inside, until a call fails",
@@ -431,7 +431,7 @@ fn rare_text(RareReport { file, found, .. }: &RareReport) -> String {
     )
 }
 
-/// What the runs took, if any were made.
+/// How long the runs took, if any were made.
 fn made(report: &Report) -> String {
     match report.wall_time {
         0.0 => String::new(),

@@ -1,4 +1,4 @@
-//! `punctual check`: findings on a configuration before anything is built.
+//! `punctual check`: findings on a configuration before it is built.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -19,7 +19,7 @@ use super::closed_loop::{self, LoopReport, RatingReport, ReachReport, Verdict, W
 use super::map::{self, MapReport, Plane};
 use crate::output::{self, number};
 
-/// Round-off of h at a start on the boundary, in its unit.
+/// Round-off of h at a start on the boundary, in the unit of h.
 const ROUND_OFF: f64 = 1e-12;
 
 /// Arguments of `punctual check`.
@@ -67,7 +67,7 @@ struct FilterReport {
     model: &'static str,
     /// Communication step in s.
     step: f64,
-    /// Why the filter follows no plans; `null` where it does.
+    /// Why the filter follows no plans; `null` if it does.
     no_plans: Option<String>,
     barriers: Vec<BarrierReport>,
     /// The start given, by state.
@@ -75,20 +75,20 @@ struct FilterReport {
     /// Status of the first sample from there.
     status: Option<&'static str>,
     warnings: Vec<String>,
-    /// The closed loop from the start, where the plant is known.
+    /// The closed loop from the start, if the plant is known.
     #[serde(skip_serializing_if = "Option::is_none")]
     closed_loop: Option<LoopReport>,
-    /// The same with damping, where that is known and was not asked for, and the run without it does not keep
-    /// every promise.
+    /// The same with damping, if the plant supports it and it was not requested, and the run without it does
+    /// not keep every promise.
     #[serde(skip_serializing_if = "Option::is_none")]
     with_damping: Option<LoopReport>,
-    /// The plan that keeps every promise whatever u_ref is, where every input has bounds.
+    /// The backup plan that keeps every promise whatever u_ref is, if every input has bounds.
     #[serde(skip_serializing_if = "Option::is_none")]
     backup_plan: Option<BackupPlanReport>,
-    /// The starts that can be promised, where they were asked for.
+    /// The starts that can be promised, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     map: Option<MapReport>,
-    /// Inputs that profiles and rates need, the best first.
+    /// Inputs that profiles and rates require, the best first.
     #[serde(skip_serializing_if = "Option::is_none")]
     effort: Option<Vec<RatingReport>>,
 }
@@ -99,20 +99,20 @@ struct BarrierReport {
     shape: &'static str,
     /// Unit of h.
     unit: String,
-    /// The order of the derivative that the row is on.
+    /// The order of the derivative that the row constrains.
     relative_degree: usize,
-    /// Where inputs enter at different orders, so that only plans move them all: what was found.
+    /// If inputs enter at different orders, so that only plans use all of them: the orders found.
     #[serde(skip_serializing_if = "Option::is_none")]
     mixed_degree: Option<String>,
     method: &'static str,
-    /// In s; `null` for a barrier without one, that is to be kept.
+    /// In s; `null` for a barrier without a deadline, which must be kept.
     deadline: Option<f64>,
-    /// In 1/s; `null` without a start where it is chosen there.
+    /// In 1/s; `null` without a start if the rate is chosen there.
     rate: Option<f64>,
     rate_times_deadline: Option<f64>,
-    /// In 1/s; `null` where it is chosen at the start.
+    /// In 1/s; `null` if it is chosen at the start.
     stay_rate: Option<f64>,
-    /// Whether the rate with which the set is kept is chosen again at every sample; it is that of the first one then.
+    /// Whether the stay rate is chosen anew at every sample; the value is then that of the first sample.
     #[serde(skip)]
     chosen: bool,
     margin: f64,
@@ -123,23 +123,24 @@ struct BarrierReport {
 struct StartReport {
     h: f64,
     inside: bool,
-    /// Whether nothing speaks against the promise: a plan keeps it, or where none is followed the first step and the closed loop do.
+    /// Whether nothing contradicts the promise: a plan keeps it or, if the filter follows none, the first
+    /// step and the closed loop do.
     promised: bool,
     /// Whether the filter follows plans and has one that keeps this promise, whatever u_ref is.
     guaranteed: bool,
-    /// Time in s until which it does, if the plan ends in motion.
+    /// Time in s until which the guarantee holds, if the plan ends in motion.
     #[serde(skip_serializing_if = "Option::is_none")]
     guaranteed_until: Option<f64>,
     /// Whether the theorem applies to the first step.
     on_course: bool,
-    /// Verdict of the closed loop, where the plant is known.
+    /// Verdict of the closed loop, if the plant is known.
     simulated: Option<Kept>,
-    /// Limits that the input bounds set, where there are any.
+    /// Limits set by the input bounds, if any.
     reach: Option<ReachReport>,
 }
 
 impl StartReport {
-    /// The first step and the closed loop together, in words.
+    /// The findings on the first step and the closed loop, as text.
     fn words(&self) -> String {
         match (self.on_course, self.simulated) {
             _ if self.guaranteed => {
@@ -203,7 +204,7 @@ struct SignalReport {
     description: String,
 }
 
-/// Checks the configuration. From a start, the code is 1 where the filter gives no guarantee.
+/// Checks the configuration. With a start, the exit code is 1 if the filter gives no guarantee.
 ///
 /// # Errors
 ///
@@ -227,7 +228,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 let message = format!("simulates, but barrier {} is external: it has no model", barrier.name);
                 return Err(Error::configuration("--effort", message));
             }
-            // Simulate and judge. What is said of a start is said of the state at which the filter is armed.
+            // Simulate and judge. Findings on a start refer to the state at which the filter is armed.
             let arm_after = configuration.arm_after;
             let configuration = configuration.armed_at_once();
             let wanted = Wanted::parse(arguments.u_ref.as_deref(), &configuration)?;
@@ -252,7 +253,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 report.map =
                     Some(map::starts(&configuration, &configuration.measured(&from), &plane, folder)?);
             }
-            // Tell, and decide the exit code.
+            // Report, and determine the exit code.
             if arguments.json {
                 output::json(&report);
             } else {
@@ -313,14 +314,14 @@ fn start(arguments: &Arguments, configuration: &FilterConfiguration) -> Result<O
                 Err(Error::configuration("plant.model", message).in_file(file))
             }
             None => {
-                // A state that the filter integrates itself begins at 0.
+                // A state that the filter integrates itself starts at 0.
                 let all = configuration.plant.states();
                 x0.iter_mut().zip(all).for_each(|(x, s)| *x = plant.x0.get(&s.name).copied().unwrap_or(0.0));
                 Ok(Some(x0))
             }
         };
     }
-    // The start of the file, and that of `--x0`.
+    // The start in the file, and that of `--x0`.
     let own = &configuration.run.x0;
     for (x, state) in x0.iter_mut().zip(configuration.plant.states()) {
         *x = own.get(&state.name).copied().unwrap_or(*x);
@@ -363,7 +364,7 @@ fn filter(
     let mut filter = closed_loop::filter(c)?;
     // The first step from the start, then the closed loops.
     let status = start.as_deref().map(|x0| first_sample(&mut filter, c, x0)).transpose()?;
-    // Rates and methods are those of the rows, of which there are no more than of the closed loop below.
+    // Rates and methods are those of the rows, even if the filter follows plans.
     let rows = first_rows(c, start.as_deref())?;
     // A filter without a model is not simulated.
     let simulated = start.as_deref().filter(|_| c.external().is_none());
@@ -388,15 +389,15 @@ fn filter(
         warnings.push("the experiment stops before the filter is armed".to_owned());
     }
     if closed_loop.is_some() {
-        warnings.extend(of_the_run(c));
+        warnings.extend(differences_from_run(c));
     }
     if !c.is_assured() {
-        warnings.extend(in_vain(c));
+        warnings.extend(disjoint_pairs(c));
     }
     let degrees: Vec<usize> = filter.relative_degrees().collect();
     let (mixed_degree, inputs) = (c.mixed_degree(), c.plant.inputs());
     let mut barriers = Vec::new();
-    // Each barrier: its settings, as given or chosen.
+    // Each barrier with its settings, given or chosen.
     for (i, section) in c.barrier.iter().enumerate() {
         let (name, unit) = (&section.name, section.unit(&c.plant));
         let settings = section.settings().map_err(|e| Error::configuration(e.field(), e.message()))?;
@@ -440,7 +441,7 @@ fn filter(
             warn("the experiment stops before the deadline".to_owned());
         }
         let mixed_degree = mixed_degree.iter().find(|(barrier, _)| *barrier == i).map(|(_, found)| found);
-        of_the_method(c, &rows, i, mixed_degree.is_some()).into_iter().for_each(&mut warn);
+        method_warnings(c, &rows, i, mixed_degree.is_some()).into_iter().for_each(&mut warn);
         // Findings from the start.
         let report = begun.then(|| filter.report().barriers[i]);
         let reach = match (simulated, settings.deadline) {
@@ -526,8 +527,9 @@ fn first_rows(c: &FilterConfiguration, start: Option<&[f64]>) -> Result<Filter, 
     Ok(rows)
 }
 
-/// Warnings on the method of barrier `i` from the first sample of `rows`; `mixed_degree`: its inputs enter at different orders.
-fn of_the_method(c: &FilterConfiguration, rows: &Filter, i: usize, mixed_degree: bool) -> Vec<String> {
+/// Warnings on the method of barrier `i` from the first sample of `rows`. `mixed_degree` says that its inputs
+/// enter at different orders.
+fn method_warnings(c: &FilterConfiguration, rows: &Filter, i: usize, mixed_degree: bool) -> Vec<String> {
     let mut warnings = Vec::new();
     if mixed_degree && !c.is_assured() {
         let reason = c.unassured();
@@ -552,8 +554,8 @@ fn of_the_method(c: &FilterConfiguration, rows: &Filter, i: usize, mixed_degree:
     warnings
 }
 
-/// What a closed loop of `check` leaves out of the run that the file describes.
-fn of_the_run(c: &FilterConfiguration) -> Vec<String> {
+/// How the closed loops of `check` differ from the run that the file describes.
+fn differences_from_run(c: &FilterConfiguration) -> Vec<String> {
     let simulated = c.run.simulated.as_ref().map(|_| match closed_loop::simulated(c) {
         Some(_) => "the closed loop has the plant in `simulated`; plans and deadlines are those of the filter's own model",
         None => {
@@ -566,8 +568,8 @@ fn of_the_run(c: &FilterConfiguration) -> Vec<String> {
     simulated.into_iter().chain(disturbed).map(str::to_owned).collect()
 }
 
-/// Barriers that are both to be kept for ever, though no state is in both sets.
-fn in_vain(c: &FilterConfiguration) -> Vec<String> {
+/// Pairs of barriers that both must hold forever although their sets do not intersect.
+fn disjoint_pairs(c: &FilterConfiguration) -> Vec<String> {
     let is_kept = |i: &usize| {
         let b = &c.barrier[*i];
         b.penalty.is_none() && b.end.is_none() && !b.until_arrival
@@ -579,21 +581,22 @@ fn in_vain(c: &FilterConfiguration) -> Vec<String> {
         .collect()
 }
 
-/// What a run of the file should know of its filter beforehand, with the barrier's name before it; `refused` tells that the
-/// promise was, and then by when there is one.
-pub(super) fn known(c: &FilterConfiguration, refused: bool) -> Result<Vec<String>, Error> {
+/// What the user should know of the filter before a run of the file, prefixed with the barrier's name. If the
+/// promise was `refused`, this includes the deadlines with which there is a plan.
+pub(super) fn notes_before_run(c: &FilterConfiguration, refused: bool) -> Result<Vec<String>, Error> {
     let mut x0 = vec![0.0; c.plant.states().len()];
     let (plant, _) = c.alone()?;
     x0.iter_mut().zip(c.plant.states()).for_each(|(x, s)| *x = plant.x0.get(&s.name).copied().unwrap_or(0.0));
     x0.extend(c.barrier_inputs().iter().map(|input| input.start));
     let c = &c.clone().armed_at_once();
-    let (mixed_degree, mut known) = (c.mixed_degree(), if c.is_assured() { Vec::new() } else { in_vain(c) });
+    let (mixed_degree, mut known) =
+        (c.mixed_degree(), if c.is_assured() { Vec::new() } else { disjoint_pairs(c) });
     if c.external().is_none() {
         let rows = first_rows(c, Some(&x0))?;
         for (i, section) in c.barrier.iter().enumerate() {
             let is_mixed = mixed_degree.iter().any(|(barrier, _)| *barrier == i);
             known.extend(
-                of_the_method(c, &rows, i, is_mixed)
+                method_warnings(c, &rows, i, is_mixed)
                     .into_iter()
                     .map(|text| format!("{}: {text}", section.name)),
             );
@@ -605,7 +608,7 @@ pub(super) fn known(c: &FilterConfiguration, refused: bool) -> Result<Vec<String
     Ok(known)
 }
 
-/// Warnings on a closed loop beyond its promises.
+/// Warnings on a closed loop, apart from its promises.
 fn loop_warnings(run: &LoopReport) -> Vec<String> {
     let unmet = run.barriers.iter().filter(|b| b.unmet > 0).map(|b| {
         let name = &b.name;

@@ -1,5 +1,5 @@
-//! Closed loops of `check`, on the filter's own model and with the wanted u_ref. They tell whether each promise
-//! is kept, the earliest deadline, and the smallest bounds.
+//! The closed loops of `check`, with the filter's own model and the wanted u_ref. They show whether each
+//! promise is kept, the earliest deadline, and the smallest bounds.
 
 use std::cell::RefCell;
 
@@ -18,26 +18,26 @@ use serde::Serialize;
 
 use crate::output::{self, number, number_above, number_below};
 
-/// Most samples until a deadline; fewer where the filter's own step is longer.
+/// The most samples until a deadline; fewer if the filter's own step is longer.
 const SAMPLES: f64 = 200.0;
 /// Relative tolerance of the earliest deadline.
 const TOLERANCE: f64 = 0.02;
-/// The longest deadline looked for, in units of the configured one.
+/// The longest deadline tried, as a multiple of the configured one.
 const HORIZON: f64 = 30.0;
 /// Gain of the damping in 1/s.
 const DAMPING: f64 = 1.0;
-/// Length of a closed loop, in units of its longest deadline.
+/// Length of a closed loop, as a multiple of its longest deadline.
 const WATCHED: f64 = 2.0;
-/// The longest step in s by which the plant is integrated in a closed loop.
+/// The longest integration step of the plant in a closed loop, in s.
 const INNER_STEP: f64 = 0.002;
-/// The fewest instants of a period at which h is looked at.
+/// The fewest instants in a period at which h is evaluated.
 const INSTANTS: f64 = 4.0;
-/// The most samples of a closed loop; a longer loop has them further apart.
+/// The most samples of a closed loop; they are further apart in a longer loop.
 const MOST_SAMPLES: f64 = 1e6;
 
 /// The u_ref of the closed loops.
 pub(super) enum Wanted {
-    /// Zero: the value in an FMU where nothing is connected.
+    /// Zero: the value in an FMU whose input is not connected.
     None,
     /// Damping: −v per second, for the vehicles by name.
     Damping,
@@ -48,8 +48,8 @@ pub(super) enum Wanted {
 }
 
 impl Wanted {
-    /// Parses `--u-ref`: `none`, `damping`, or values such as `a=0.5,omega=0`; without, the u_ref of the file, where it is
-    /// for the filter's own model.
+    /// Parses `--u-ref`: `none`, `damping`, or values such as `a=0.5,omega=0`. By default the u_ref of the
+    /// file, if it is for the filter's own model.
     pub(super) fn parse(text: Option<&str>, c: &FilterConfiguration) -> Result<Self, Error> {
         let Some(text) = text else {
             let own = c.integrator.is_none() && (c.run.simulated.is_none() || simulated(c).is_some());
@@ -92,7 +92,7 @@ impl Wanted {
         Ok(Self::Constant(values))
     }
 
-    /// In words, as `--u-ref` takes it.
+    /// In the form that `--u-ref` accepts.
     fn words(&self, c: &FilterConfiguration) -> String {
         match self {
             Self::None => "u_ref = 0 (--u-ref none)".to_owned(),
@@ -126,7 +126,8 @@ impl Wanted {
     }
 }
 
-/// The plant that the file has to simulate in place of the filter's model, where its states and inputs are those of the model.
+/// The plant that the file simulates in place of the filter's model, if its states and inputs are those of
+/// the model.
 pub(super) fn simulated(c: &FilterConfiguration) -> Option<&PlantSection> {
     let names = |signals: Vec<VariableSection>| signals.into_iter().map(|s| s.name).collect::<Vec<_>>();
     let is_alike = |plant: &PlantSection| {
@@ -140,7 +141,7 @@ fn plant(c: &FilterConfiguration) -> Result<Box<dyn DynPlant>, Error> {
     Ok(simulated(c).unwrap_or(&c.plant).build()?)
 }
 
-/// Whether damping is known for the plant: the fourth state of every vehicle is a velocity.
+/// Whether damping is available for the plant, as for every named vehicle, whose fourth state is a velocity.
 pub(super) fn has_damping(c: &FilterConfiguration) -> bool {
     c.plant.model().is_some() && c.plant.states().len() > 3
 }
@@ -148,11 +149,11 @@ pub(super) fn has_damping(c: &FilterConfiguration) -> bool {
 /// Result of a closed loop.
 #[derive(Serialize)]
 pub(super) struct LoopReport {
-    /// u_ref in words.
+    /// u_ref as text.
     pub(super) u_ref: String,
     /// Whether every promise was kept.
     pub(super) kept: bool,
-    /// Whether it is one of the rows, though the filter follows plans.
+    /// Whether the loop uses only the rows although the filter follows plans.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub(super) by_rows: bool,
     /// End of the run in s.
@@ -161,7 +162,7 @@ pub(super) struct LoopReport {
     step: f64,
     pub(super) barriers: Vec<LoopBarrier>,
     pub(super) inputs: Vec<LoopInput>,
-    /// States that left the range in which the model is meant.
+    /// States that left the range for which the model is intended.
     pub(super) beyond: Vec<LoopState>,
 }
 
@@ -171,7 +172,7 @@ pub(super) struct LoopBarrier {
     pub(super) name: String,
     pub(super) promise: Kept,
     arrival: Option<f64>,
-    /// Time in s since which it has been inside.
+    /// Time in s from which it was inside.
     #[serde(skip)]
     since: Option<f64>,
     late: Option<f64>,
@@ -187,9 +188,9 @@ pub(super) struct LoopBarrier {
 pub(super) struct LoopInput {
     pub(super) name: String,
     unit: String,
-    /// Largest size.
+    /// Largest magnitude.
     pub(super) peak: f64,
-    /// Its bounds; `null` where it has none.
+    /// Its bounds; `null` if it has none.
     pub(super) bounds: Option<[f64; 2]>,
 }
 
@@ -229,14 +230,14 @@ impl LoopInput {
 }
 
 impl LoopReport {
-    /// The time in s from `start` since which barrier `index` has been inside, where every promise was kept: a deadline that this
-    /// very run meets.
+    /// The time in s after `start` from which barrier `index` was inside, if every promise was kept: a
+    /// deadline that this run meets.
     pub(super) fn arrival(&self, index: usize, start: f64) -> Option<f64> {
         let barrier = self.barriers.get(index).filter(|b| self.kept && b.promise == Kept::Kept)?;
         Some(barrier.since? - start).filter(|after| *after > 0.0)
     }
 
-    /// A line that tells whether the promises were kept.
+    /// A line that says whether the promises were kept.
     pub(super) fn head(&self) -> String {
         let words = if self.kept { "every promise is kept" } else { "NOT every promise is kept" };
         let verdict = output::verdict(words, self.kept);
@@ -253,7 +254,7 @@ impl LoopReport {
         rows.extend(self.barriers.iter().map(|b| {
             let promise = super::run::shown(b.promise);
             let [arrival, left, least] = [b.arrival, b.left, b.least_h].map(shown);
-            // A promise that is lost is not followed until it is reached.
+            // After a promise is lost, the run may end before the arrival.
             let late = super::run::lateness(b.late_by, "not seen");
             let unmet = b.unmet.to_string();
             vec![b.name.clone(), promise, arrival, late, left, least, unmet, shown(b.first_unmet)]
@@ -264,7 +265,7 @@ impl LoopReport {
     }
 }
 
-/// The experiment's length in s, or well past every deadline.
+/// The experiment's length in s, or well beyond every deadline if that is longer.
 fn watched(c: &FilterConfiguration) -> f64 {
     let ends = c.barrier.iter().flat_map(|b| [b.deadline, b.begin, b.end]);
     let longest = ends.flatten().fold(0.0, f64::max);
@@ -277,7 +278,7 @@ pub(super) fn filter(c: &FilterConfiguration) -> Result<Filter, Error> {
     Ok(if follows { c.build_loop()? } else { c.build()? })
 }
 
-/// The closed loop of the configuration from `x0`, well past every deadline.
+/// The closed loop of the configuration from `x0`, well beyond every deadline.
 pub(super) fn watch(c: &FilterConfiguration, x0: &[f64], wanted: &Wanted) -> Result<LoopReport, Error> {
     let (mut filter, plant) = (filter(c)?, plant(c)?);
     let (length, deadlines) = (watched(c), deadlines(c));
@@ -291,7 +292,7 @@ pub(super) fn watch(c: &FilterConfiguration, x0: &[f64], wanted: &Wanted) -> Res
         schedule: Schedule { step, steps, substeps },
         deadlines: &deadlines,
         delay: c.actuation_delay,
-        // A lost promise is not followed for long, since steps that cannot be met take the longest.
+        // A lost promise is not simulated for long, since steps that cannot be met take the longest.
         until: deadlines.iter().copied().filter(|d| d.is_finite()).fold(0.0, f64::max),
     };
     let run = effort::run(&mut filter, &setting, |t, x, u_ref| wanted.write(c, t, x, u_ref))?;
@@ -315,7 +316,7 @@ pub(super) fn watch(c: &FilterConfiguration, x0: &[f64], wanted: &Wanted) -> Res
         peak,
     });
     let beyond = c.plant.states().into_iter().zip(&run.states).filter_map(|(state, seen)| {
-        // A value that is not a number is beyond every range.
+        // NaN is outside every range.
         let within = state.min.is_none_or(|min| seen[0] >= min) && state.max.is_none_or(|max| seen[1] <= max);
         let (seen, range) = (*seen, [state.min, state.max]);
         let finite = seen.iter().all(|x| x.is_finite());
@@ -333,13 +334,13 @@ pub(super) fn watch(c: &FilterConfiguration, x0: &[f64], wanted: &Wanted) -> Res
     })
 }
 
-/// Whether the bounds allow the deadline.
+/// Whether the bounds allow a deadline.
 #[derive(Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Verdict {
     /// The filter meets it in simulation.
     CanBeMet,
-    /// No input within the bounds is inside at the deadline.
+    /// No input within the bounds leads inside by the deadline.
     CannotBeMet,
     NotKnown,
 }
@@ -348,13 +349,13 @@ pub(super) enum Verdict {
 #[derive(Serialize)]
 pub(super) struct ReachReport {
     pub(super) deadline: Verdict,
-    /// Least time in s that any input within the bounds needs.
+    /// Lower bound in s on the time that any input within the bounds needs.
     earliest_at_least: Option<f64>,
-    /// The earliest deadline that this filter meets in simulation, or a plan in the model, in s.
+    /// The earliest deadline in s that this filter meets in simulation, or a plan on the model.
     earliest_at_most: Option<f64>,
-    /// Whether it is a plan that meets the deadline.
+    /// Whether the finding comes from a plan.
     by_plan: bool,
-    /// Whether it is the closed loop that meets the earliest one.
+    /// Whether the closed loop meets the earliest deadline.
     #[serde(skip)]
     by_loop: bool,
 }
@@ -381,14 +382,14 @@ impl ReachReport {
     }
 }
 
-/// Inputs that one candidate needs.
+/// Inputs that one candidate requires.
 #[derive(Serialize)]
 pub(super) struct RatingReport {
     profile: &'static str,
     rate_times_deadline: f64,
     /// Largest input among the accelerations, without bounds on them, in m/s2.
     peak: Option<f64>,
-    /// The smallest bound on them with which the deadlines are kept, in m/s2.
+    /// The smallest bound on the accelerations with which the deadlines are kept, in m/s2.
     smallest_bound: Option<f64>,
     /// The lines for the configuration.
     settings: String,
@@ -422,9 +423,9 @@ fn deadlines(c: &FilterConfiguration) -> Vec<f64> {
     c.barrier.iter().map(|b| b.deadline.unwrap_or(f64::INFINITY)).collect()
 }
 
-/// Limits that the bounds set to barrier `index`, of that deadline, from `x0`; `rows` is the filter of `c`. `plans`: where they are followed, whether there
-/// is one for this deadline, and the earliest for which there is. `arrival`: when the closed loop that keeps everything is
-/// there.
+/// Limits that the bounds set on barrier `index` with this deadline, from `x0`; `rows` is the filter of `c`. `plans`, if they are
+/// followed, says whether there is one for this deadline, and the earliest deadline that has one. `arrival`
+/// is the arrival in the closed loop that keeps every promise.
 pub(super) fn reach(
     (c, rows): (&FilterConfiguration, &Filter),
     (index, deadline): (usize, f64),
@@ -463,8 +464,8 @@ pub(super) fn reach(
         let mut filter = tried.build()?;
         Ok::<_, Error>(run(c, &mut filter, (x0, wanted), &deadlines(&tried))?.kept)
     };
-    // The search grows from a deadline that is not ruled out, since the longest deadlines are the longest runs. A deadline comes
-    // after the begin of its barrier, and no later than the end.
+    // The search goes upwards from a deadline that is not ruled out, since the longest deadlines give the
+    // longest runs. A deadline lies after the beginning of its barrier, and not after its end.
     let section = &c.barrier[index];
     let begin = section.begin.filter(|_| section.after.is_none()).unwrap_or(0.0);
     let end = section.end.filter(|end| *end > 0.0 && section.after.is_none()).unwrap_or(f64::INFINITY);
@@ -501,14 +502,14 @@ fn named(profile: ProfileKind) -> ProfileName {
     }
 }
 
-/// A bound in m/s² as the lines to paste write it. It is tried so, since below the peak a little more can be
-/// worse.
+/// A bound in m/s², rounded as in the lines to paste. The rounded bound is tried, since below the peak a
+/// slightly larger bound can be worse.
 fn written(bound: f64) -> f64 {
     (bound * 1e3).ceil() / 1e3
 }
 
-/// Rates the candidates of [`effort`] from `x0`, by the bounds on the inputs that are accelerations. The other
-/// inputs keep theirs.
+/// Rates the candidates of [`effort`] from `x0`, by the bounds on the inputs that are accelerations. The
+/// other inputs keep their bounds.
 pub(super) fn ratings(
     c: &FilterConfiguration,
     x0: &[f64],
@@ -570,7 +571,7 @@ pub(super) fn ratings(
         .collect())
 }
 
-/// The ratings as a table, and the best as lines to paste.
+/// The ratings as a table, and the best one as lines to paste.
 pub(super) fn ratings_text(ratings: &[RatingReport], wanted: &str) -> String {
     let head = ["profile", "rate times deadline", "peak m/s2", "smallest bound m/s2"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];

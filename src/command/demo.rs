@@ -88,7 +88,7 @@ fn text(runs: &[[Run; 3]]) -> String {
         rows.push(vec![
             run.case.vehicle.title().to_owned(),
             run.case.title.to_owned(),
-            // To the step, by which some are late.
+            // With the resolution of the step, since some are late by only that.
             format!("{DEADLINE:.3} s"),
             s.arrival.map_or("never".to_owned(), |t| format!("{t:.3} s")),
             quantity(s.min_h_after_deadline, run.case.setup.shape.unit()),
@@ -108,7 +108,7 @@ fn text(runs: &[[Run; 3]]) -> String {
     )
 }
 
-/// The length of the input vector where its components share a unit, else both components.
+/// The norm of the input vector if its components share a unit, else both components.
 fn peaks(run: &Run, values: [f64; 2], norm: f64) -> String {
     match run.case.vehicle.inputs() {
         [first, second] if first.unit == second.unit => quantity(norm, &cases::unit(first)),

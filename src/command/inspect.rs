@@ -25,7 +25,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// The report on an FMU, as JSON. What only one version of FMI has is absent for the other.
+/// The report on an FMU, as JSON. Fields that only one version of FMI has are absent for the other.
 #[derive(Default, Serialize)]
 struct Report<'a> {
     file: String,
@@ -52,7 +52,7 @@ struct Report<'a> {
     interfaces: Option<Vec<fmi3::Interface<'a>>>,
     default_experiment: Option<Experiment>,
     variables: Vec<VariableReport<'a>>,
-    /// For each output the inputs it depends on directly; `null` where the FMU does not say.
+    /// For each output, the inputs it depends on directly; `null` if the FMU does not declare them.
     dependencies: Vec<DependencyReport<'a>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     states: Option<Vec<&'a str>>,
@@ -83,7 +83,7 @@ struct VariableReport<'a> {
     description: Option<&'a str>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     items: Vec<(&'a str, i64)>,
-    /// The sizes of an array, as numbers or by the variables that have them.
+    /// The sizes of an array, as numbers or by the variables that hold them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     dimensions: Vec<fmi3::Size<'a>>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -96,7 +96,7 @@ struct DependencyReport<'a> {
     on: Option<Vec<&'a str>>,
 }
 
-/// Facts for the head of the text, with their names.
+/// Facts for the header of the text, with their names.
 type Facts = Vec<(&'static str, String)>;
 
 /// Shows the FMU.
@@ -144,7 +144,7 @@ fn show(arguments: &Arguments, report: &Report<'_>, facts: Facts) {
     }
 }
 
-/// A text, if there is one.
+/// A text, if it is not empty.
 fn given(text: &str) -> Option<&str> {
     (!text.is_empty()).then_some(text)
 }
@@ -156,7 +156,7 @@ fn experiment(of: Option<DefaultExperiment>) -> Option<Experiment> {
     })
 }
 
-/// The facts that both versions have, around those of one version, which come after the description.
+/// The facts that both versions share. Those of one version, `own`, come after the description.
 fn text(report: &Report<'_>, own: Facts) -> String {
     let text = |text: Option<&str>| text.unwrap_or_default().to_owned();
     let mut facts = vec![("model", report.model_name.to_owned()), ("description", text(report.description))];
@@ -201,7 +201,7 @@ fn join<const N: usize>(separator: &str, parts: [Option<String>; N]) -> String {
     parts.into_iter().flatten().collect::<Vec<_>>().join(separator)
 }
 
-/// The words of the flags that are set.
+/// The words for the flags that are set.
 fn flags(named: &[(bool, &str)]) -> String {
     named.iter().filter(|(yes, _)| *yes).map(|(_, text)| *text).collect::<Vec<_>>().join(", ")
 }
@@ -235,7 +235,7 @@ fn variables(report: &Report<'_>) -> String {
     output::table(&rows, &[false, true, false, false, false, true, true, true, false])
 }
 
-/// The dependencies, a line for each set of inputs with the outputs that depend on exactly these.
+/// The dependencies: for each set of inputs a line with the outputs that depend on exactly these.
 fn dependencies(report: &Report<'_>) -> String {
     let mut lines: Vec<(String, Vec<&str>)> = Vec::new();
     for DependencyReport { output, on } in &report.dependencies {

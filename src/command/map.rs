@@ -1,4 +1,4 @@
-//! Pictures of `check`: the plan from the start, and the starts from which there is one.
+//! The pictures of `check`: the plan from the start, and the map of starts that have a plan.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -16,20 +16,20 @@ use serde::Serialize;
 
 use crate::output::{Progress, labelled};
 
-/// Points of a plan, about.
+/// About how many points of a plan are drawn.
 const POINTS: f64 = 400.0;
 
-/// A map of starts, as it was asked for.
+/// The requested map of starts.
 pub(super) struct Plane {
-    /// The numbers of the two states.
+    /// The indices of the two states.
     states: [usize; 2],
-    /// From and to.
+    /// The ends of both ranges.
     ranges: [[f64; 2]; 2],
     /// Cells along each axis.
     cells: usize,
 }
 
-/// A map of starts, as it was drawn.
+/// The map of starts that was drawn.
 #[derive(Serialize)]
 pub(super) struct MapReport {
     /// Number of starts with a plan.
@@ -41,7 +41,7 @@ pub(super) struct MapReport {
 }
 
 impl Plane {
-    /// Reads `x=0..10,y=-5..5`, two of the filter's states.
+    /// Parses `x=0..10,y=-5..5`, with two of the filter's states.
     pub(super) fn parse(text: &str, cells: usize, c: &FilterConfiguration) -> Result<Self, Error> {
         let refuse = |message: String| Error::configuration("--map", message);
         let states = c.measured_states();
@@ -70,7 +70,8 @@ impl Plane {
     }
 }
 
-/// Draws which starts have a plan, `x0`, as it is [measured](FilterConfiguration::measured), but for the two states of `plane`, into `folder`.
+/// Draws to `folder` which starts have a plan. They are `x0`, as [measured](FilterConfiguration::measured),
+/// with the two states of `plane` varied.
 pub(super) fn starts(
     c: &FilterConfiguration,
     x0: &[f64],
@@ -89,7 +90,7 @@ pub(super) fn starts(
     kinds.extend(["no plan reaches an equilibrium", "nothing to promise"].map(str::to_owned));
     let others = c.barrier.len() + 1;
     let kind = |planning: Planning<'_>, x: &[f64]| {
-        // Outside of a set without a deadline nothing can be promised of it.
+        // Outside a set without a deadline, nothing can be promised for it.
         let lost = c
             .barrier
             .iter()
@@ -105,7 +106,7 @@ pub(super) fn starts(
             (None, Err(_)) => others,
         }
     };
-    // A filter for each thread: a search is long, and a filter is not shared.
+    // Each thread has its own filter, since a search is long and a filter cannot be shared.
     let (done, progress) = (AtomicUsize::new(0), Mutex::new(Progress::new("starts")));
     let cells: Vec<usize> = (0..side * side)
         .into_par_iter()
@@ -148,7 +149,7 @@ pub(super) fn starts(
     };
     let mut table = format!("{},{},found\n", signals[plane.states[0]].name, signals[plane.states[1]].name);
     for (cell, kind) in cells.iter().enumerate() {
-        // Writing to a text cannot fail.
+        // Writing to a string cannot fail.
         let _ = writeln!(table, "{},{},{}", centre(0, cell % side), centre(1, cell / side), kinds[*kind]);
     }
     let [drawn, listed] = ["svg", "csv"].map(|ending| folder.join(format!("{}-map.{ending}", c.name)));
@@ -158,7 +159,7 @@ pub(super) fn starts(
     Ok(MapReport { promised, of: cells.len(), files: [drawn, listed].iter().map(shown).collect() })
 }
 
-/// Draws `plan` from `x0` at `t` into `folder`: h, the inputs, and the path where there is a plane.
+/// Draws `plan` from `x0` at `t` to `folder`: h, the inputs, and the path if there is a plane.
 pub(super) fn plan(
     c: &FilterConfiguration,
     (filter, plan): (&Filter, &BackupPlan),
@@ -209,7 +210,7 @@ pub(super) fn plan(
     let file = |what: &str| folder.join(format!("{}-{what}.svg", c.name));
     let mut files = vec![file("plan")];
     plot::times(&panels, &files[0])?;
-    // The vehicles by name have their place first.
+    // The named vehicles have their position first.
     let states = c.plant.states();
     if c.plant.model().is_some() && states.len() >= 2 && states[0].unit == "m" && states[1].unit == "m" {
         let along = |i: usize| way.iter().map(|(_, x, _)| x[i]).collect();

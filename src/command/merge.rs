@@ -1,4 +1,4 @@
-//! `punctual merge`: equal FMUs from different systems become one.
+//! `punctual merge`: merges equal FMUs from different systems into one.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -39,7 +39,7 @@ struct Reported {
     model_name: String,
     guid: String,
     platforms: Vec<Platform>,
-    /// Errors that `validate` finds in the product, those of its parts among them.
+    /// Errors that `validate` finds in the merged FMU, including those of its parts.
     errors: usize,
     left_out: Vec<String>,
     not_examined: Vec<String>,
@@ -51,11 +51,11 @@ struct Platform {
     from: String,
 }
 
-/// Joins the FMUs and tries the product.
+/// Merges the FMUs and tries the result.
 ///
 /// # Errors
 ///
-/// As [`merge::merge`].
+/// Those of [`merge::merge`].
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let limit = (!arguments.no_trial).then_some(arguments.time_limit);
     let merged = merge::merge(&arguments.files, &arguments.output, limit)?;

@@ -27,7 +27,7 @@ use punctual_fmu::configuration::Configuration;
 use crate::codes::INTERRUPTED;
 use crate::output;
 
-/// Reads a configuration file, and prints what the user has to know of it.
+/// Reads a configuration file, and prints its warnings.
 fn read(file: &Path) -> Result<Configuration, Error> {
     let configuration = package::read_configuration(file)?;
     if let Some(warning) = configuration.warning() {
@@ -36,7 +36,7 @@ fn read(file: &Path) -> Result<Configuration, Error> {
     Ok(configuration)
 }
 
-/// What is set at the first Ctrl-C; the second one ends the program at once.
+/// A flag that the first Ctrl-C sets; the second one ends the program immediately.
 fn interruption() -> Result<Arc<AtomicBool>, Error> {
     let stop = Arc::new(AtomicBool::new(false));
     let handle = Arc::clone(&stop);

@@ -32,11 +32,11 @@ enum Start {
     Fmu,
 }
 
-/// Writes the file, and for an FMU the filter's file beside it.
+/// Writes the file and, for an FMU, the filter's file next to it.
 ///
 /// # Errors
 ///
-/// A name without the ending .toml, a file that is there already or cannot be written.
+/// A name without the extension .toml, a file that already exists or cannot be written.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let file = &arguments.file;
     if !text::is_toml(file) {
@@ -76,7 +76,7 @@ fn there(path: &Path) -> Error {
     Error::configuration("FILE", message)
 }
 
-/// Writes `template` for the file at `path`, which is not there yet.
+/// Writes `template` to a new file at `path`.
 fn write(path: &Path, template: &str) -> Result<(), Error> {
     let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let text = template.replace("{FILE}", &name).replace("{STEM}", &stem(path));

@@ -1,4 +1,4 @@
-//! `punctual replay`: one run of a campaign again, from its Parquet file alone.
+//! `punctual replay`: repeats one run of a campaign from its Parquet file alone.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -60,11 +60,11 @@ struct Difference {
     found: String,
 }
 
-/// Makes the run again and compares its row.
+/// Repeats the run and compares its row.
 ///
 /// # Errors
 ///
-/// A file that is no campaign's, a run that it does not have, a file that cannot be written.
+/// A file that belongs to no campaign, a run that it does not contain, a file that cannot be written.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let (path, run) = (&arguments.file, arguments.run);
     // Read the recorded row.
@@ -95,7 +95,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         })
         .collect();
 
-    // Run once more, and record the signals that the system asks for.
+    // Run once more, and record the signals that the system requests.
     let choice = campaign.choice(run);
     let mut simulation = campaign.simulation(campaign.system())?;
     campaign.start(&mut simulation, &choice);
@@ -124,7 +124,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         failure: failure.map(|e| e.to_string()),
         files,
     };
-    // Tell, and decide the exit code.
+    // Report, and determine the exit code.
     if arguments.json {
         output::json(&report);
     } else {
@@ -147,7 +147,8 @@ fn values(campaign: &Campaign, choice: &Choice) -> Vec<ValueReport> {
     campaign.varied().iter().zip(&choice.values).map(value).collect()
 }
 
-/// The system's pictures. A system without any gets h with its bound for each barrier whose signals are recorded.
+/// The system's pictures. A system without any gets h with its bound for each barrier whose signals are
+/// recorded.
 fn pictures(system: &System, measures: &Measures, recording: &Recording) -> Vec<Drawing> {
     if !system.pictures().is_empty() {
         return system.pictures().iter().cloned().map(Drawing::from).collect();

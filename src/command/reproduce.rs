@@ -1,4 +1,4 @@
-//! `punctual reproduce`: the paper's tables and figures beside ours.
+//! `punctual reproduce`: the paper's tables and figures next to ours.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -50,7 +50,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let options = Options { timed: !arguments.untimed, ..chosen };
     let progress = Mutex::new(Progress::new("reproduce"));
     let tell = |fraction| {
-        // Another thread is drawing the bar; this one has nothing to add.
+        // If another thread is drawing the bar, this one can skip it.
         if let Ok(mut progress) = progress.try_lock() {
             progress.show(fraction);
         }

@@ -1,4 +1,4 @@
-//! `punctual run`: couples FMUs as a system file says, or simulates what a filter's file has.
+//! `punctual run`: couples FMUs as a system file says, or simulates a filter's file.
 
 use std::ffi::OsString;
 use std::fs::File;
@@ -117,7 +117,7 @@ struct ComponentReport {
     model: String,
 }
 
-/// A recorded signal in short; numbers that are not finite are `null` in JSON.
+/// Summary of a recorded signal; numbers that are not finite are `null` in JSON.
 #[derive(Serialize)]
 struct SignalReport {
     name: String,
@@ -151,7 +151,7 @@ fn rows_file(folder: &Path) -> PathBuf {
     folder.join("rows.csv")
 }
 
-/// Runs the system in a child process and tells how the child ended.
+/// Runs the system in a child process and reports how the child ended.
 fn isolated(arguments: &Arguments) -> Result<ExitCode, Error> {
     let child = Child::new()?;
     let mut words: Vec<OsString> = vec!["run".into()];
@@ -170,7 +170,7 @@ fn isolated(arguments: &Arguments) -> Result<ExitCode, Error> {
     };
     if let Some(folder) = &arguments.out {
         let (rows, csv) = (rows_file(child.folder()), csv_file(&arguments.system, folder));
-        // The file is empty where the run had not begun.
+        // The file is empty if the run had not begun.
         if std::fs::metadata(&rows).is_ok_and(|rows| rows.len() > 0) {
             std::fs::copy(&rows, &csv).map_err(|e| Error::io("write", &csv, e))?;
             output::note(&format!("note: what was recorded until then is in {}", csv.display()));
@@ -180,12 +180,12 @@ fn isolated(arguments: &Arguments) -> Result<ExitCode, Error> {
     Err(Error::broken(what, how.to_string()))
 }
 
-/// Writes each row at once, so that no row is lost with the process.
+/// Writes each row immediately, so that no row is lost if the process ends.
 fn stream(rows: &mut Option<File>, write: impl FnOnce(&mut Vec<u8>) -> io::Result<()>) {
     let Some(file) = rows else { return };
     let mut line = Vec::new();
     if write(&mut line).and_then(|()| file.write_all(&line)).is_err() {
-        // The run and its own recording go on. Only a crash would show fewer rows.
+        // The run and its own recording continue. Only after a crash would there be fewer rows.
         *rows = None;
     }
 }
@@ -195,9 +195,9 @@ struct Opened {
     system: System,
     models: Vec<Model>,
     simulation: Simulation,
-    /// The folder for what is written.
+    /// The folder for the output.
     out: Option<PathBuf>,
-    /// The filter, where the file is that of one.
+    /// The filter, if the file is a filter's.
     filter: Option<Box<FilterConfiguration>>,
 }
 
@@ -226,7 +226,7 @@ fn open(arguments: &Arguments) -> Result<Opened, Error> {
     Ok(Opened { system, models, simulation, out, filter })
 }
 
-/// Runs the system in this process; each row also goes to `rows` at once.
+/// Runs the system in this process; each row also goes to `rows` immediately.
 fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error> {
     let path = &arguments.system;
     let Opened { system, models, mut simulation, out, filter } =
@@ -236,7 +236,7 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
         return Err(Error::configuration("--report", message));
     }
     if let Some(folder) = &out {
-        // The folder is made before the run, which may be long.
+        // The folder is created before the run, which may be long.
         std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
     }
 
@@ -266,7 +266,7 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
     notes.extend(remarks(&outcome.promises));
     if let Some(filter) = filter {
         let is_refused = is_refused(&outcome.recording);
-        notes.extend(check::known(&filter, is_refused).map_err(|e| e.in_file(path))?);
+        notes.extend(check::notes_before_run(&filter, is_refused).map_err(|e| e.in_file(path))?);
     }
     let notes = output::grouped(notes);
     let mut files = Vec::new();
@@ -299,21 +299,21 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
     if missed.is_empty() {
         return Ok(ExitCode::from(codes::DONE));
     }
-    // What is broken is seen from the verdict.
+    // The verdict already shows what is broken.
     if required != Requirement::Unbroken {
         output::note(&format!("note: --require {} is not met by {}", required.word(), missed.join(", ")));
     }
     Ok(ExitCode::from(codes::FOUND))
 }
 
-/// Whether the filter of a file that runs alone refused its promise at the first sample.
+/// Whether the filter of a single-file run refused its promise at the first sample.
 fn is_refused(recording: &Recording) -> bool {
     let place = recording.columns().iter().position(|column| column.name == "filter.assurance");
     let first = place.and_then(|index| recording.column(index).next());
     first == Some(f64::from(AssuranceStatus::Refused as u8))
 }
 
-/// The name of a system file without its ending. All files written begin with it.
+/// The name of a system file without its extension, which is the prefix of all files written.
 pub(super) fn stem(path: &Path) -> String {
     path.file_stem().map_or_else(|| "system".into(), |stem| stem.to_string_lossy().into_owned())
 }
@@ -322,9 +322,8 @@ fn csv_file(path: &Path, folder: &Path) -> PathBuf {
     folder.join(format!("{}.csv", stem(path)))
 }
 
-/// Writes the CSV file, with `units` or without, and the `pictures` into `folder`, which exists, under names that begin with
-/// `stem`.
-/// Returns their paths.
+/// Writes the CSV file, with or without `units`, and the `pictures` to the existing `folder`, under names
+/// with the prefix `stem`. Returns their paths.
 pub(super) fn write_files(
     pictures: &[Drawing],
     stem: &str,
@@ -355,7 +354,7 @@ fn summary(
     let recording = &outcome.recording;
     let signal = |index: usize| {
         let column = &recording.columns()[index];
-        // f64::min and f64::max pass over NaN.
+        // f64::min and f64::max ignore NaN.
         let min = recording.column(index).fold(f64::NAN, f64::min);
         let max = recording.column(index).fold(f64::NAN, f64::max);
         let last = recording.column(index).last().unwrap_or(f64::NAN);
@@ -414,7 +413,7 @@ fn text(report: &Report, signals: bool) -> String {
         text.push_str("\n\nwritten: ");
         text.push_str(&report.files.join("\n         "));
     }
-    // The verdict comes last, where it is read.
+    // The verdict comes last, where it is most visible.
     if let Some((verdict, sentence)) = coupling::verdict(&report.promises) {
         let sentence = match verdict {
             Kept::Kept | Kept::Broken => output::verdict(&sentence, verdict == Kept::Kept),
@@ -426,7 +425,7 @@ fn text(report: &Report, signals: bool) -> String {
     text
 }
 
-/// What the user should know of promises beside their verdicts.
+/// What the user should know about promises besides their verdicts.
 fn remarks(promises: &[Promise]) -> impl Iterator<Item = String> + '_ {
     promises.iter().filter_map(|p| {
         let text = match p.promise {
@@ -450,7 +449,7 @@ pub(super) fn shown(promise: Kept) -> String {
     }
 }
 
-/// By how many seconds a deadline was missed; `never` where what it is for was not reached.
+/// By how many seconds a deadline was missed; `never` if the barrier was not reached at all.
 pub(super) fn lateness(late_by: Option<f64>, never: &str) -> String {
     match late_by {
         Some(late) if late.is_finite() => number(late),
@@ -459,7 +458,7 @@ pub(super) fn lateness(late_by: Option<f64>, never: &str) -> String {
     }
 }
 
-/// A row for each promise and an empty line; nothing where there is no promise.
+/// A row for each promise, followed by an empty line; empty if there is no promise.
 pub(super) fn promises_text(promises: &[Promise]) -> String {
     if promises.is_empty() {
         return String::new();

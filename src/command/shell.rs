@@ -1,4 +1,4 @@
-//! `punctual completions` and `punctual man`: what a shell and `man` know of the commands.
+//! `punctual completions` and `punctual man`: the commands described for a shell and for `man`.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -28,7 +28,7 @@ pub struct ManArguments {
 ///
 /// # Errors
 ///
-/// None in practice: the script is text.
+/// None in practice, since the script is text.
 pub fn execute_completions(
     arguments: &CompletionArguments,
     mut program: clap::Command,

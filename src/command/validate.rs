@@ -1,4 +1,4 @@
-//! `punctual validate`: the defects of an FMU.
+//! `punctual validate`: finds the defects of an FMU.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -67,7 +67,7 @@ struct Rule {
     asks: &'static str,
 }
 
-/// Examines the FMU. The exit code is 0 without errors (there may be warnings), else 1.
+/// Examines the FMU. The exit code is 0 if there are no errors (warnings are allowed), else 1.
 ///
 /// # Errors
 ///

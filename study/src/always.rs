@@ -1,5 +1,5 @@
-//! What bounds and u_ref leave of a promise: rows alone, plans, and the filters of the literature that fall back on a
-//! backup.
+//! How promises hold under bounds and any u_ref: for rows alone, for backup plans, and for the filters of the
+//! literature that have a backup.
 
 use std::sync::Arc;
 
@@ -25,43 +25,44 @@ use super::starts::{hundred, uniform};
 use super::table::{Cell, Table};
 use super::{Figure, Options, Watch};
 
-/// Sampling period in s of all but the tube.
+/// Sampling period in s of all methods except the tube.
 const PERIOD: f64 = 0.05;
-/// Sampling period in s of the tube, which accounts for no held input.
+/// Sampling period in s of the tube, which does not account for held inputs.
 const FINE: f64 = 1e-3;
 /// End of a run in s.
 const END: f64 = 2.0 * DEADLINE;
-/// Bound on |u_i| of the points, and on the acceleration of the others, in m/s² (m/s where the input is a velocity).
+/// Bound on |u_i| of the points, and on the acceleration of the others, in m/s² (m/s if the input is a
+/// velocity).
 const BOUND: f64 = 8.0;
 /// Bound on the turning rate in rad/s, and on the slip angle in rad.
 const TURN: f64 = 1.0;
-/// u_ref away from the disc, in the unit of u.
+/// Magnitude of a u_ref away from the disc, in the unit of u.
 const PUSH: f64 = 5.0;
-/// Periods for which gatekeeper follows u_ref at most.
+/// The most periods for which gatekeeper follows u_ref.
 const LEAD: usize = 20;
-/// Periods within which a brake has to reach its terminal set.
+/// Periods within which a brake must reach its terminal set.
 const HORIZON: usize = 40;
 /// α of the backup control barrier function in 1/s.
 const RATE: f64 = 2.0;
-/// Points at which h is looked at in every period.
-const LOOKS: usize = 5;
-/// The least change of u_ref that counts, as a part of the bounds.
-const SEEN: f64 = 1e-6;
+/// Number of points in each period at which h is checked.
+const CHECKS: usize = 5;
+/// The least change of u_ref that counts, relative to the bounds.
+const LEAST_CHANGE: f64 = 1e-6;
 /// Points of a curve.
 const POINTS: usize = 400;
 /// Seed of the starts inside the disc.
 const SEED: u64 = 2000;
 
-/// What is asked.
+/// What the filter is asked to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Task {
-    /// From outside: inside by the deadline, and from then on.
+    /// From outside: be inside by the deadline, and stay.
     Reach,
-    /// From inside: for ever.
+    /// From inside: stay forever.
     Stay,
 }
 
-/// Who filters.
+/// The filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Method {
     Rows,
@@ -83,12 +84,12 @@ impl Method {
     }
 }
 
-/// What moves.
+/// The vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Body {
-    /// A point moved by its velocity.
+    /// A point whose velocity is the input.
     Point,
-    /// One of the paper's.
+    /// A vehicle of the paper.
     Of(Vehicle),
 }
 
@@ -108,25 +109,27 @@ impl Body {
     }
 }
 
-/// One loop.
+/// The result of one closed loop.
 #[derive(Clone, Debug, Default)]
 struct Run {
     accepted: bool,
     on_time: bool,
     kept: bool,
-    /// Samples, those at which the input is not u_ref, and the sum over them of the change as a part of the bounds.
+    /// Number of samples, of samples whose input is not u_ref, and the sum over samples of the change
+    /// relative to the bounds.
     samples: usize,
     changed: usize,
     distance: f64,
-    /// Time and h of every sample.
-    way: Vec<[f64; 2]>,
+    /// Time and h at every sample.
+    trajectory: Vec<[f64; 2]>,
 }
 
-/// A filter in a loop: the input, and whether the promise is accepted, for time, state and u_ref within its bounds.
+/// A filter in a loop. For time, state and u_ref within the bounds, it returns the input and whether the
+/// promise is accepted.
 type Law<const NX: usize> = Box<dyn FnMut(f64, &[f64; NX], &[f64; 2]) -> Step>;
 type Step = Result<([f64; 2], bool), punctual_core::Error>;
 
-/// A plant with its brake, and what u_ref is.
+/// A plant with its brake, and its u_ref.
 struct Case<'a, P, const NX: usize> {
     plant: P,
     bounds: [f64; 2],
@@ -150,7 +153,7 @@ impl<P: ControlAffine<NX, 2>, const NX: usize> Case<'_, P, NX> {
     /// Runs `filter` from `x`.
     fn run(&self, task: Task, mut filter: Law<NX>, mut x: [f64; NX]) -> Result<Run, Error> {
         let (disc, limits) = (disc().map_err(Error::from)?, limits(self.bounds));
-        let (period, look) = (self.period, self.period / LOOKS as f64);
+        let (period, substep) = (self.period, self.period / CHECKS as f64);
         let steps = (END / period).round() as usize;
         let mut run = Run { kept: true, ..Run::default() };
         for k in 0..steps {
@@ -161,17 +164,17 @@ impl<P: ControlAffine<NX, 2>, const NX: usize> Case<'_, P, NX> {
             run.accepted = if k == 0 { accepted } else { run.accepted };
             run.samples += 1;
             let change: f64 = (0..2).map(|i| (u[i] - wanted[i]).abs() / self.bounds[i] / 2.0).sum();
-            run.changed += usize::from(change > SEEN);
+            run.changed += usize::from(change > LEAST_CHANGE);
             run.distance += change;
-            run.way.push([t, disc.value(t, &x)]);
-            for part in 0..LOOKS {
-                let at = t + look * part as f64;
+            run.trajectory.push([t, disc.value(t, &x)]);
+            for part in 0..CHECKS {
+                let at = t + substep * part as f64;
                 let is_inside = disc.value(at, &x) >= 0.0;
-                // Half a look early, so that round-off of a time decides nothing.
-                run.on_time |= is_inside && at < DEADLINE + look / 2.0;
-                let is_due = task == Task::Stay || at > DEADLINE - look / 2.0;
+                // Compares half a step early, so that round-off in the time does not matter.
+                run.on_time |= is_inside && at < DEADLINE + substep / 2.0;
+                let is_due = task == Task::Stay || at > DEADLINE - substep / 2.0;
                 run.kept &= is_inside || !is_due;
-                x = rk4_step(&self.plant, &x, &u, look);
+                x = rk4_step(&self.plant, &x, &u, substep);
             }
         }
         run.kept &= run.on_time;
@@ -179,7 +182,7 @@ impl<P: ControlAffine<NX, 2>, const NX: usize> Case<'_, P, NX> {
     }
 }
 
-/// `filter` as a filter in a loop, with or without plans.
+/// `filter` in a loop, with or without backup plans.
 fn ours<const NX: usize>(method: Method, mut filter: Filter) -> Result<Law<NX>, Error> {
     if method == Method::Plans {
         let mut filter = filter.with_plans(PERIOD).map_err(Error::from)?;
@@ -237,14 +240,14 @@ where
     case.run(task, filter, x0)
 }
 
-/// A brake to fall back on, which keeps the disc.
+/// A braking backup that keeps the disc.
 fn backup<P, const M: usize>(
     plant: P,
     bounds: [f64; 2],
     speeds: [usize; M],
 ) -> Result<Backup<P, Brake<M>, DistanceDisc, Stoppable<DistanceDisc, M>>, Error> {
     let safe = disc().map_err(Error::from)?;
-    // Half of the fastest that a held input does not turn into an oscillation.
+    // Half of the largest gain that does not oscillate with a held input.
     let brake = Brake { speeds, gain: 0.5 / PERIOD, limit: bounds[0] };
     let terminal = Stoppable { set: safe, brake };
     let (bounds, horizon) = (limits(bounds), HORIZON);
@@ -252,7 +255,7 @@ fn backup<P, const M: usize>(
     backup.validated().map_err(Error::from)
 }
 
-/// A run of a point that is moved by its velocity.
+/// A run of a point whose velocity is the input.
 fn point_run((task, method, nominal): (Task, Method, Nominal), x0: [f64; 4]) -> Result<Run, Error> {
     let bounds = Body::Point.bounds();
     let u_ref = move |x: &[f64; 2]| Vehicle::PointMass.reference(nominal, &[x[0], x[1], 0.0, 0.0]);
@@ -274,7 +277,7 @@ fn point_run((task, method, nominal): (Task, Method, Nominal), x0: [f64; 4]) -> 
     let mut filter: Law<2> = ours(method, filter)?;
     if method == Method::Tube {
         let h0 = disc().map_err(Error::from)?.value(0.0, &x0);
-        // The gradient is shortest at the edge, and the box of inputs holds the disc of its bound.
+        // The gradient is shortest at the edge, and the box of inputs contains the disc of that radius.
         let authority = bounds[0] * RADIUS / elementary::hypot(RADIUS, SMOOTHING);
         let least = tube(1.0).map_err(Error::from)?.least_deadline(h0, authority);
         let accepted = least.is_some_and(|least| least <= DEADLINE);
@@ -296,11 +299,11 @@ fn run(body: Body, asked: (Task, Method, Nominal), x0: [f64; 4]) -> Result<Run, 
     }
 }
 
-/// Random starts inside the disc from which a brake stays inside: position, angle and speed up to 4 m/s are uniform, those
-/// from which it does not are left out.
+/// Random starts inside the disc from which a brake stays inside. Position, angle and speed up to 4 m/s are
+/// uniform; starts from which it leaves are rejected.
 fn inside(body: Body, count: usize) -> Result<Vec<[f64; 4]>, Error> {
     let mut uniform = uniform(SEED);
-    // The speed counts as a whole, whatever states it is made of.
+    // Only the magnitude of the velocity matters, whichever states represent it.
     let terminal = backup(PointMass, body.bounds(), [2, 3])?.terminal;
     let mut starts = Vec::new();
     while starts.len() < count {
@@ -325,10 +328,10 @@ fn inside(body: Body, count: usize) -> Result<Vec<[f64; 4]>, Error> {
 /// Cells of the table: task, body, methods, and the choices of u_ref by name.
 type Cells = (Task, Body, Vec<Method>, Vec<(&'static str, Nominal)>);
 
-/// What is run.
+/// The runs of the table.
 fn plan() -> Vec<Cells> {
     let all = vec![("0", Nominal::Coast), ("damping", Nominal::Damping), ("outwards", Nominal::Away(PUSH))];
-    // A velocity that is the input has nothing to damp.
+    // If the velocity is the input, there is nothing to damp.
     let point = vec![all[0], all[2]];
     let mut plan = vec![];
     for vehicle in Vehicle::ALL {
@@ -342,12 +345,12 @@ fn plan() -> Vec<Cells> {
     plan
 }
 
-/// Random starts of each cell of the table.
+/// Number of random starts in each cell of the table.
 fn starts(options: &Options) -> usize {
     options.runs.min(20)
 }
 
-/// Number of loops of [`table`].
+/// Number of closed loops in [`table`].
 pub(super) fn loops(options: &Options) -> usize {
     plan().iter().map(|(_, _, methods, nominals)| methods.len() * nominals.len()).sum::<usize>()
         * starts(options)
@@ -357,7 +360,7 @@ pub(super) fn loops(options: &Options) -> usize {
 ///
 /// # Errors
 ///
-/// None in fact: all parameters are constants.
+/// None in practice, since all parameters are constants.
 pub(super) fn table(options: &Options, watch: &Watch) -> Result<(Table, bool), Error> {
     let mut table = Table::new(
         "always",
@@ -426,8 +429,8 @@ pub(super) fn table(options: &Options, watch: &Watch) -> Result<(Table, bool), E
     Ok((table, all_kept))
 }
 
-/// The table with the choices of u_ref beside each other, for the guide.
-pub(super) fn beside(table: &Table) -> Table {
+/// The table with the choices of u_ref side by side, for the guide.
+pub(super) fn side_by_side(table: &Table) -> Table {
     const MEASURES: [usize; 6] = [5, 6, 7, 8, 9, 10];
     let mut header = vec!["asked", "vehicle", "method", "starts"];
     header.extend(MEASURES.map(|c| table.header[c].as_str()));
@@ -449,19 +452,19 @@ pub(super) fn beside(table: &Table) -> Table {
     out
 }
 
-/// The pictures: a point mass whose u_ref leads outwards.
+/// The pictures, of a point mass whose u_ref leads outwards.
 ///
 /// # Errors
 ///
-/// None in fact: all parameters are constants.
+/// None in practice, since all parameters are constants.
 pub(super) fn figures() -> Result<Vec<Figure>, Error> {
     const X0: [f64; 4] = [0.0, 0.0, -10.0, 0.0];
-    /// At the centre, and on the way out.
+    /// At the centre, moving outwards.
     const INSIDE: [f64; 4] = [CENTRE[0], CENTRE[1], 2.0, 0.0];
     let body = Body::Of(Vehicle::PointMass);
     let curve = |task, method: Method, (name, nominal): (&str, Nominal), x0, colour, style| {
         let run = run(body, (task, method, nominal), x0)?;
-        let (x, y) = run.way.into_iter().map(|[t, h]| (t, h)).unzip();
+        let (x, y) = run.trajectory.into_iter().map(|[t, h]| (t, h)).unzip();
         let label = format!("{}{name}", method.title());
         Ok::<_, Error>(Curve { label, x, y, style, colour, ..Curve::default() }.thinned(POINTS))
     };
@@ -522,7 +525,7 @@ pub(super) fn figures() -> Result<Vec<Figure>, Error> {
 mod tests {
     use super::*;
 
-    /// One run of each kind: a plan keeps what rows lose, and what falls back on a brake stays.
+    /// One run of each kind: plans keep what rows lose, and methods with a braking backup stay inside.
     #[test]
     fn a_start_of_every_kind() {
         let outwards = Nominal::Away(PUSH);
@@ -540,7 +543,7 @@ mod tests {
     }
 
     #[test]
-    fn choices_of_u_ref_stand_beside_each_other() {
+    fn choices_of_u_ref_are_side_by_side() {
         let mut table = Table::new("t", "", &["a", "v", "u", "m", "n", "1", "2", "3", "4", "5", "6"]);
         for (u_ref, value) in [("0", 1.0), ("outwards", 2.5)] {
             let mut row: Vec<Cell> = ["reach", "mass", u_ref, "rows"].map(Cell::from).into();
@@ -548,7 +551,7 @@ mod tests {
             row.extend((0..5).map(|_| Cell::Number(value, 1)));
             table.rows.push(row);
         }
-        let found = beside(&table).rows;
+        let found = side_by_side(&table).rows;
         assert_eq!(found.len(), 1);
         let shown: Vec<String> = found[0].iter().map(Cell::shown).collect();
         assert_eq!(shown[..4], ["reach", "mass", "rows", "3"]);

@@ -1,4 +1,4 @@
-//! Baselines with their parameters, and our own methods, in the settings they are run in.
+//! The baselines with their parameters, our own methods, and the settings in which they run.
 
 use punctual_core::elementary;
 use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Method, ProfileKind, Sampling};
@@ -10,10 +10,10 @@ use punctual_reference::baselines::{Chain, Exponent, Exponential, FirstOrderFixe
 pub enum Baseline {
     /// The paper's method: the repeated root.
     RepeatedRoot,
-    /// Ours: the Hermite profile with its default rate. Held inputs are accounted for, their period known from
-    /// the start.
+    /// Ours: the Hermite profile with its default rate. It accounts for held inputs, whose period is known
+    /// from the start.
     Profile,
-    /// Ours, enforced at the samples only.
+    /// Ours, enforced only at the samples.
     ProfilePointwise,
     /// Ours with the profile of least peak.
     LowPeak,
@@ -25,7 +25,7 @@ pub enum Baseline {
     FiniteTime([f64; 2], f64),
     /// First-order fixed-time: exponent, and the rate (1/s) of the second order.
     FirstOrder(f64, f64),
-    /// A tube: power of its schedule, and rate (1/s).
+    /// A tube: the power of its schedule, and its rate (1/s).
     Tube(usize, f64),
 }
 
@@ -45,7 +45,7 @@ impl Baseline {
         }
     }
 
-    /// Its parameters, in words.
+    /// Its parameters as text.
     pub fn parameters(self) -> String {
         match self {
             Self::RepeatedRoot | Self::Profile | Self::ProfilePointwise | Self::LowPeak => "-".to_owned(),
@@ -57,7 +57,7 @@ impl Baseline {
         }
     }
 
-    /// Number of parameters that have to be chosen.
+    /// Number of free parameters.
     pub fn parameter_count(self) -> usize {
         match self {
             Self::RepeatedRoot | Self::Profile | Self::ProfilePointwise | Self::LowPeak => 0,
@@ -67,8 +67,8 @@ impl Baseline {
         }
     }
 
-    /// The baselines of the literature with default parameters, which are ours: a = 20/T as in our own default
-    /// where it is a rate of errors against a moving bound, 1 for the gains of chains, 1/2 for exponents.
+    /// The baselines of the literature with our default parameters: a = 20/T as in our own default for a rate
+    /// of errors against a moving bound, 1 for the gains of chains, 1/2 for exponents.
     pub fn defaults(deadline: f64) -> [Self; 5] {
         let rate = BarrierSettings::default_rate(deadline, 0.0);
         [
@@ -80,7 +80,7 @@ impl Baseline {
         ]
     }
 
-    /// The candidates of [`super::search`] for the same method; none where there is nothing to choose.
+    /// The candidates of [`super::search`] for the same method; none if it has no free parameters.
     pub fn candidates(self) -> Vec<Self> {
         let powers = |from: i32, to: i32| (from..=to).map(|e| elementary::powi(2.0, e));
         match self {
@@ -89,7 +89,7 @@ impl Baseline {
                 rates.map(Self::Exponential).into()
             }
             Self::HighOrder(_) => {
-                // The order of the two gains makes no difference.
+                // The order of the two gains does not matter.
                 let pairs = powers(-2, 5).flat_map(|p| powers(-2, 5).map(move |q| [p, q]));
                 pairs.filter(|[p, q]| p <= q).map(Self::HighOrder).collect()
             }
@@ -146,7 +146,7 @@ impl Baseline {
         builder.sampling(self.sampling(setup.step)).and_then(FilterBuilder::build)
     }
 
-    /// The treatment of the period between samples; `step` is the first, in s.
+    /// How the period between samples is treated; `step` is the first one, in s.
     pub fn sampling(self, step: f64) -> Sampling {
         match self {
             Self::Profile | Self::LowPeak => Sampling::Measured { first: Some(step) },

@@ -1,4 +1,4 @@
-//! The table of docs/bicycle.md: how much of the promise survives where the plant is another bicycle than the
+//! The table of docs/bicycle.md: how well the promise holds if the plant is another bicycle than the
 //! filter's, and what restores it.
 
 use std::sync::Arc;
@@ -23,7 +23,7 @@ const DEADLINE: f64 = 5.0;
 const ACCELERATION: f64 = 40.0;
 /// Largest rate of the slip or steering angle in rad/s.
 const RATE: f64 = 4.0;
-/// Rate in 1/s at which the angle follows its wanted value, which is 0.
+/// Rate in 1/s at which the angle follows its target value, which is 0.
 const GAIN: f64 = 2.0;
 
 /// A vehicle.
@@ -38,11 +38,11 @@ pub struct Size {
 }
 
 impl Size {
-    /// A car that turns on a circle of 3 m, with a steering angle of 0.83 rad.
+    /// A car with a turning circle of 3 m radius and a steering angle of 0.83 rad.
     pub const CAR: Self = Self { title: "car", length: 1.5, slip: 0.5 };
-    /// The paper's, on a circle of 20 m.
+    /// The paper's vehicle, with a turning circle of 20 m.
     pub const LONG: Self = Self { title: "paper's, 0.5 rad", length: 10.0, slip: 0.5 };
-    /// The same with a steering angle of 1.38 rad, on a circle of 8.3 m.
+    /// The paper's vehicle with a steering angle of 1.38 rad and a turning circle of 8.3 m.
     pub const AGILE: Self = Self { title: "paper's, 1.2 rad", length: 10.0, slip: 1.2 };
 
     fn simplified(self) -> Result<Bicycle, punctual_core::Error> {
@@ -58,12 +58,12 @@ impl Size {
     }
 }
 
-/// A model of a bicycle, for a filter or for the plant.
+/// A bicycle model, for the filter or for the plant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Model {
-    /// The slip angle turns the heading only.
+    /// The slip angle only turns the heading.
     Simplified,
-    /// The slip angle moves the vehicle sideways too, in proportion.
+    /// The slip angle also moves the vehicle sideways, proportionally.
     SmallSlip,
     /// The bicycle without approximation.
     Kinematic,
@@ -82,8 +82,8 @@ impl Model {
         }
     }
 
-    /// The plant of this model. Its second input is the angle of a filter for `filter`: the steering angle of a
-    /// kinematic one, else the slip angle.
+    /// The plant of this model. Its second input is the angle that `filter` computes: the steering angle for
+    /// the kinematic model, else the slip angle.
     fn plant(self, size: Size, filter: Self) -> Result<Box<dyn DynPlant>, punctual_core::Error> {
         let steering = if filter == Self::Kinematic { Steering::Angle } else { Steering::SlipAngle };
         Ok(match self {
@@ -94,7 +94,7 @@ impl Model {
     }
 }
 
-/// Settings of a filter that make up for its model.
+/// Filter settings that compensate for its model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Remedy {
     /// Its name in the table.
@@ -103,7 +103,7 @@ pub struct Remedy {
     pub margin: f64,
     /// Rate of both phases, in 1/s.
     pub rate: f64,
-    /// Bound on the part of ḧ that the model does not know, in m/s².
+    /// Bound on the unmodelled part of ḧ, in m/s².
     pub disturbance: f64,
 }
 
@@ -119,23 +119,23 @@ impl Remedy {
     ];
 }
 
-/// A filter on a plant.
+/// A filter paired with a plant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pairing {
     /// The vehicle.
     pub size: Size,
-    /// The bicycle that the filter believes in.
+    /// The bicycle model of the filter.
     pub filter: Model,
-    /// Its settings against the error of the model.
+    /// Its settings against the model error.
     pub remedy: Remedy,
-    /// The bicycle that the plant is.
+    /// The bicycle model of the plant.
     pub plant: Model,
     /// Sampling period in s.
     pub step: f64,
 }
 
 impl Pairing {
-    /// The pairings of the table with steps above `finest` (in s), in its order.
+    /// The pairings of the table with steps above `finest` (in s), in the order of the table.
     fn all(finest: f64) -> Vec<Self> {
         let mut all = Vec::new();
         let steps = [(0.01, &Remedy::ALL[..]), (0.001, &[Remedy::NONE])];
@@ -187,8 +187,8 @@ impl Pairing {
         filter.with_integrator(angle)
     }
 
-    /// Runs from `x0` until 2T. Returns the outcome, and whether a step before the deadline did not meet its
-    /// constraint.
+    /// Runs from `x0` until 2T. Returns the outcome, and whether some step before the deadline did not meet
+    /// its constraint.
     fn run(&self, x0: [f64; 4]) -> Result<(Outcome, bool), punctual_core::Error> {
         let setup = Setup::advised(DEADLINE, self.step);
         let plant = self.plant.plant(self.size, self.filter)?;
@@ -231,36 +231,36 @@ impl Pairing {
     }
 }
 
-/// Result of the runs of a pairing.
+/// Results of the runs of a pairing.
 #[derive(Clone, Copy, Debug)]
 pub struct Tally {
     /// Number of runs.
     pub runs: usize,
-    /// Runs that are inside at a sample up to the deadline.
+    /// Runs that are inside at some sample up to the deadline.
     pub on_time: usize,
     /// Runs that are inside at every sample from the deadline to 2T.
     pub inside: usize,
     /// Least h at these samples, in m.
     pub least: f64,
-    /// Runs in which a step before the deadline did not meet its constraint, so that nothing is promised.
+    /// Runs in which some step before the deadline did not meet its constraint, so that nothing is promised.
     pub unmet: usize,
     /// Median of the largest |a| of the runs, in m/s².
     pub peak: Option<f64>,
 }
 
 impl Tally {
-    /// Whether all were on time, and inside from then on.
+    /// Whether all runs were on time, and inside from then on.
     pub fn kept(&self) -> bool {
         (self.on_time, self.inside) == (self.runs, self.runs)
     }
 }
 
-/// The table, and whether the car was kept by every filter on every plant. `tell` hears of the fraction done,
+/// The table, and whether every filter kept the car's promise on every plant. `tell` gets the fraction done,
 /// from any thread.
 ///
 /// # Errors
 ///
-/// None in fact: all parameters are constants.
+/// None in practice, since all parameters are constants.
 pub fn table(options: &Options, tell: &(dyn Fn(f64) + Sync)) -> Result<(Table, bool), Error> {
     let starts = hundred(options.runs);
     let mut table = Table::new(

@@ -14,7 +14,7 @@ use punctual_cosim::error::Error;
 
 /// Deadline in s of the runs from rest and of the pictures over time, as in the paper.
 pub const DEADLINE: f64 = 10.0;
-/// Sampling period in s where nothing else is said.
+/// Default sampling period in s.
 pub const STEP: f64 = 1e-3;
 /// Centre of the safe disc in m.
 pub const CENTRE: [f64; 2] = [45.0, 45.0];
@@ -72,7 +72,7 @@ impl Vehicle {
         self.signals()[1]
     }
 
-    /// The position among the states of the speed that each input changes. The damping input is its negative.
+    /// The index of the state that is the speed changed by each input. The damping input is its negative.
     pub fn damped(self) -> [Option<usize>; 2] {
         match self {
             Self::PointMass => [Some(2), Some(3)],
@@ -101,7 +101,7 @@ impl Vehicle {
     ///
     /// # Errors
     ///
-    /// None in fact: all numbers are constants.
+    /// None in practice, since all numbers are constants.
     pub fn source(self, shape: Shape) -> Result<Box<dyn DerivativeSource>, Error> {
         fn shaped<P>(plant: P, shape: Shape) -> Result<Box<dyn DerivativeSource>, punctual_core::Error>
         where
@@ -134,12 +134,12 @@ impl Vehicle {
     }
 }
 
-/// A signal's unit as people see it.
+/// A signal's unit for display.
 pub fn unit(signal: &Signal) -> String {
     signal.unit.replace('2', "²")
 }
 
-/// A signal's symbol and unit as people see them.
+/// A signal's symbol and unit for display.
 pub fn label(signal: &Signal) -> String {
     let symbol = match signal.name {
         "omega" => "ω",
@@ -149,7 +149,7 @@ pub fn label(signal: &Signal) -> String {
     format!("{symbol} ({})", unit(signal))
 }
 
-/// The forms of the barrier; the set is the same.
+/// The forms of the barrier, which describe the same set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
     /// R² − d², in m²: the paper's.
@@ -175,16 +175,17 @@ pub enum Nominal {
     Coast,
     /// −v on the accelerations: ours.
     Damping,
-    /// This acceleration (m/s²) away from the disc. The constraint alone leads there, and is active throughout.
+    /// This acceleration (m/s²) away from the disc. Only the constraint leads to the disc, and is active
+    /// throughout.
     Away(f64),
 }
 
-/// Integrators of the plant under a held input. The paper does not say which one it uses.
+/// Integrators of the plant with a held input. The paper does not say which one it uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Integrator {
     /// x + f dt.
     Euler,
-    /// The same for the last two states, then the positions with their new values.
+    /// Euler for the last two states, then the positions with the new values.
     SemiImplicit,
     /// Runge-Kutta of order 4.
     Rk4,
@@ -226,7 +227,7 @@ impl Integrator {
     }
 }
 
-/// The settings of a loop beside vehicle and constraint.
+/// The settings of a loop, besides vehicle and constraint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setup {
     /// The barrier.
@@ -262,7 +263,7 @@ impl Setup {
         }
     }
 
-    /// The settings that we advise: the distance-shaped disc, damping, a margin of 0.02 m, until 2T.
+    /// The settings that we recommend: the distance-shaped disc, damping, a margin of 0.02 m, until 2T.
     pub fn advised(deadline: f64, step: f64) -> Self {
         Self {
             shape: Shape::Distance,
@@ -272,7 +273,7 @@ impl Setup {
         }
     }
 
-    /// Whether it has the barrier and the nominal controller that we advise.
+    /// Whether it has the barrier and the nominal controller that we recommend.
     pub fn is_advised(&self) -> bool {
         self.shape == Shape::Distance && self.nominal == Nominal::Damping
     }

@@ -16,10 +16,11 @@ const POINTS: usize = 800;
 /// Bounds on |u_1| and |u_2| in the pictures of inputs.
 const BOUNDS: [f64; 2] = [8.0, 3.0];
 
-/// Baseline in the pictures: gains and exponent as [`Baseline::defaults`] has them.
+/// The baseline in the pictures, with gains and exponent of [`Baseline::defaults`].
 const EXISTING: Baseline = Baseline::FiniteTime([1.0, 1.0], 0.5);
 
-/// The same baseline as [`super::search`] finds it for all three vehicles in the setting that we advise.
+/// The same baseline with the parameters that [`super::search`] finds for all three vehicles in the
+/// recommended setting.
 const SEARCHED: Baseline = Baseline::FiniteTime([4.0, 4.0], 0.5);
 
 /// A recorded loop.
@@ -100,7 +101,7 @@ fn zero() -> Vec<Mark> {
 ///
 /// # Errors
 ///
-/// None in fact: all parameters are constants.
+/// None in practice, since all parameters are constants.
 pub fn all(options: &Options) -> Result<(Vec<Figure>, Table), Error> {
     let mut figures = Vec::new();
     for vehicle in Vehicle::ALL {
@@ -274,7 +275,7 @@ fn phase_portrait() -> Result<Figure, Error> {
         (Baseline::RepeatedRoot, Setup { margin: 0.0, ..Setup::advised(T, STEP) }, 1, Style::Dashed),
     ] {
         for (i, speed) in speeds.into_iter().enumerate() {
-            // The velocity lies along the line of sight, from the middle of the box.
+            // The velocity points along the line of sight, from the middle of the box.
             let part = speed / f64::sqrt(2.0);
             let mut trace = Trace::new(Vehicle::PointMass, method, &setup, [10.0, 10.0, part, part])?;
             if method == Baseline::RepeatedRoot {
@@ -321,7 +322,8 @@ fn phase_portrait() -> Result<Figure, Error> {
     })
 }
 
-/// The order p of y ≈ c xᵖ by least squares in logarithms, over the positive values; none below two.
+/// The order p of y ≈ c xᵖ by least squares in logarithms, over the positive values; `None` if there are
+/// fewer than two.
 fn order(x: &[f64], y: &[f64]) -> Option<f64> {
     let points: Vec<(f64, f64)> = x
         .iter()
@@ -338,7 +340,8 @@ fn order(x: &[f64], y: &[f64]) -> Option<f64> {
     Some(above / points.iter().map(|p| elementary::powi(p.0 - mx, 2)).sum::<f64>())
 }
 
-/// The time at which h passes 0, between samples, less the deadline; none without an arrival.
+/// The time at which h crosses 0, interpolated between samples, minus the deadline; `None` without an
+/// arrival.
 fn lateness(trace: &Trace, deadline: f64) -> Option<f64> {
     let k = trace.arrival()?;
     let (before, after) = (trace.h.get(k.checked_sub(1)?)?, trace.h[k]);
@@ -351,7 +354,7 @@ type Start = fn(Vehicle) -> [f64; 4];
 /// Speed in m/s of [`moving`].
 const SPEED: f64 = 20.0;
 
-/// At the origin, with [`SPEED`] towards the disc.
+/// At the origin, moving with [`SPEED`] towards the disc.
 fn moving(vehicle: Vehicle) -> [f64; 4] {
     match vehicle {
         Vehicle::PointMass => [0.0, 0.0, SPEED / 2_f64.sqrt(), SPEED / 2_f64.sqrt()],
@@ -359,14 +362,14 @@ fn moving(vehicle: Vehicle) -> [f64; 4] {
     }
 }
 
-/// The cost of held inputs, against the step.
+/// The cost of held inputs over the step size.
 fn steps(options: &Options) -> Result<(Vec<Figure>, Table), Error> {
     /// u_ref of the shortfall's runs, in m/s².
     const PUSH: f64 = 5.0;
-    /// Period in s from which the order of the margin that compensation adds is fitted.
+    /// Period in s from which the order of the compensation margin is fitted.
     const CLEAR: f64 = 5e-3;
     const MARGIN: &str = "margin added (m), order from 5 ms";
-    // The table, and how a row and a curve are made.
+    // The table, and functions for a row and a curve.
     let all = [1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2];
     let periods: Vec<f64> = all.into_iter().filter(|p| *p >= options.finest).collect();
     let mut table = Table::new(
@@ -387,7 +390,7 @@ fn steps(options: &Options) -> Result<(Vec<Figure>, Table), Error> {
                 Some(v) => format!("{v:.2e}").into(),
             }
         };
-        // At smaller periods, round-off is more of the margin than compensation is.
+        // At smaller periods, round-off dominates the compensation margin.
         let from = if what == MARGIN { CLEAR } else { 0.0 };
         let (x, y): (Vec<f64>, Vec<f64>) = periods.iter().zip(values).filter(|(p, _)| **p >= from).unzip();
         let fitted = order(&x, &y).filter(|_| values.iter().all(|v| *v > 0.0));
@@ -410,7 +413,7 @@ fn steps(options: &Options) -> Result<(Vec<Figure>, Table), Error> {
         (Baseline::ProfilePointwise, "profile, pointwise", Style::Solid),
         (Baseline::Profile, "profile, compensated", Style::Solid),
     ];
-    // Lateness in the settings of each method.
+    // Lateness of each method in its settings.
     let mut late = Vec::new();
     for (i, vehicle) in Vehicle::ALL.into_iter().enumerate() {
         for (method, name, style) in methods {
@@ -430,7 +433,7 @@ fn steps(options: &Options) -> Result<(Vec<Figure>, Table), Error> {
             }
         }
     }
-    // Shortfall where the constraint alone leads, and the margin that compensation adds.
+    // Shortfall if only the constraint leads to the disc, and the margin that compensation adds.
     let mut short = Vec::new();
     let origin = |_: Vehicle| [0.0; 4];
     let starts: [(&str, Start); 2] = [("from rest", origin), ("moving", moving)];
@@ -494,7 +497,7 @@ fn steps(options: &Options) -> Result<(Vec<Figure>, Table), Error> {
     Ok((figures, table))
 }
 
-/// Peak input against the deadline.
+/// Peak input over the deadline.
 fn deadlines() -> Result<Figure, Error> {
     const PERIOD: f64 = 2e-3;
     let times = [2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0];
@@ -515,7 +518,7 @@ fn deadlines() -> Result<Figure, Error> {
             ends: [None; 2],
         })
     };
-    // Either component of d, reached at any speed under a constant acceleration: d/√2 = a T²/2.
+    // Each component of d, reached at any speed under a constant acceleration: d/√2 = a T²/2.
     let distance = elementary::hypot(CENTRE[0], CENTRE[1]) - RADIUS;
     let least = times.iter().map(|t| f64::sqrt(2.0) * distance / (t * t)).collect();
     Ok(Figure {

@@ -1,8 +1,8 @@
-//! The paper's tables and figures beside ours, and beside the baselines of the literature.
+//! The paper's tables and figures compared with ours, and with the baselines of the literature.
 //!
-//! Tables and figures run in process: the filter of `punctual-core`, a plant that moves by the integrator named,
-//! inputs held between samples. Every number except the times is a pure function of the options. [`demo`] runs
-//! its cases through FMI.
+//! Tables and figures run in process: the filter of `punctual-core`, a plant with the named integrator,
+//! inputs held between samples. Every number except the times is a pure function of the options. [`demo`]
+//! runs its cases through FMI.
 //!
 //! Each module uses only modules above it:
 //!
@@ -11,7 +11,7 @@
 //! cases                vehicles, settings and nominal controllers
 //! table                rows of cells: text, CSV, JSON, Markdown, HTML
 //! baseline             the methods that are compared
-//! trial                one closed loop, and what is measured of it
+//! trial                one closed loop and its measurements
 //! search               the best parameters of a method
 //! always               what survives bounds and any u_ref
 //! bicycles             the kinematic bicycle's models and remedies
@@ -22,7 +22,7 @@
 //! demo                 the demonstration, through FMI
 //! ```
 #![forbid(unsafe_code)]
-// Elementary functions are those of the core: clippy.toml.
+// Elementary functions come from the core: see clippy.toml.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
 pub mod always;
@@ -55,9 +55,9 @@ pub use table::{Cell, Table};
 pub struct Options {
     /// Random starts of every table, 1 to 100.
     pub runs: usize,
-    /// Number of seeds drawn from: 1 to this number.
+    /// Number of seeds; seeds 1 to this number are used.
     pub seeds: u64,
-    /// Starts of the search for parameters on its first pass and on its second, and the number of candidates that
+    /// Starts of the parameter search on its first pass and on its second, and the number of candidates that
     /// reach the second.
     pub search: (usize, usize, usize),
     /// The smallest step in s.
@@ -69,11 +69,11 @@ pub struct Options {
 impl Options {
     /// The extent of the paper's tables.
     pub const FULL: Self = Self { runs: 100, seeds: 10, search: (6, 8, 4), finest: 1e-4, timed: true };
-    /// A few runs, for a first look and for tests: the same tables, with fewer starts.
+    /// A few runs, for a first look and for tests: the same tables with fewer starts.
     pub const QUICK: Self = Self { runs: 4, seeds: 2, search: (1, 1, 1), finest: 1e-3, timed: true };
 }
 
-/// Counts loops.
+/// Counts the closed loops that are done.
 pub struct Watch<'a> {
     done: AtomicUsize,
     total: usize,
@@ -81,19 +81,19 @@ pub struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    /// Tells `tell` the fraction of `total` loops that is done.
+    /// Reports to `tell` the fraction of `total` loops that is done.
     pub fn new(total: usize, tell: &'a (dyn Fn(f64) + Sync)) -> Self {
         Self { done: AtomicUsize::new(0), total: total.max(1), tell }
     }
 
-    /// `loops` more are done.
+    /// Counts `loops` more as done.
     pub fn done(&self, loops: usize) {
         let done = self.done.fetch_add(loops, Ordering::Relaxed) + loops;
         (self.tell)(done as f64 / self.total as f64);
     }
 }
 
-/// A picture with its place in files and documents.
+/// A picture with its name in files and its caption.
 #[derive(Clone, Debug, Serialize)]
 pub struct Figure {
     /// Its name in files.
@@ -104,7 +104,7 @@ pub struct Figure {
     pub chart: Chart,
 }
 
-/// Everything that the command finds.
+/// All results of the command.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// The options of the study.
@@ -114,15 +114,15 @@ pub struct Report {
     /// The pictures.
     #[serde(skip)]
     pub figures: Vec<Figure>,
-    /// Whether ours kept every deadline.
+    /// Whether our method kept every deadline.
     pub kept: bool,
 }
 
-/// Runs everything; `tell` hears of the fraction done, from any thread.
+/// Runs everything; `tell` gets the fraction done, from any thread.
 ///
 /// # Errors
 ///
-/// None in fact: all parameters are constants.
+/// None in practice, since all parameters are constants.
 pub fn run(options: Options, tell: &(dyn Fn(f64) + Sync)) -> Result<Report, Error> {
     let watch = Watch::new(tables::loops(&options), tell);
     let (tables, kept) = tables::all(&options, &watch)?;
@@ -132,7 +132,7 @@ pub fn run(options: Options, tell: &(dyn Fn(f64) + Sync)) -> Result<Report, Erro
     Ok(Report { options, tables: all, figures, kept })
 }
 
-/// Writes tables as CSV, pictures as SVG and the page `report.html` into `folder`.
+/// Writes tables as CSV, pictures as SVG and the page `report.html` to `folder`.
 ///
 /// # Errors
 ///

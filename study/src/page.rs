@@ -1,4 +1,4 @@
-//! The report as one page of HTML: tables, and pictures that can be zoomed and read off.
+//! The report as one HTML page: tables, and pictures that can be zoomed and read off.
 
 use punctual_cosim::error::Error;
 use punctual_pictures::page::{Page, escape};

@@ -1,4 +1,5 @@
-//! The best parameters of a method, for one vehicle and one setting: a grid, then its best points again.
+//! Searches the best parameters of a method for one vehicle and one setting: on a grid, then again at its
+//! best points.
 
 use std::cmp::Ordering;
 
@@ -9,12 +10,13 @@ use super::baseline::Baseline;
 use super::starts::drawn;
 use super::{Options, Setup, Vehicle, Watch, trial};
 
-/// Seed of the starts that parameters are chosen on, which no table uses.
+/// Seed of the starts for choosing parameters, which no table uses.
 pub const SEED: u64 = 1000;
 /// Sampling period in s of the first pass; the second has that of the tables.
 pub const COARSE: f64 = 0.005;
 
-/// Score of a candidate: the runs that kept their deadline, those on time, then the smaller median peak.
+/// Score of a candidate: first the runs that kept their deadline, then those on time, then the smaller median
+/// peak.
 #[derive(Clone, Copy, Debug)]
 struct Score {
     kept: usize,
@@ -42,13 +44,13 @@ fn score(vehicle: Vehicle, baseline: Baseline, setup: &Setup, starts: &[[f64; 4]
     Ok(Score { kept, on_time, peak: peaks[peaks.len() / 2] })
 }
 
-/// Number of loops that [`best`] runs, for the progress.
+/// Number of closed loops that [`best`] runs, for the progress.
 pub fn loops(method: Baseline, options: &Options) -> usize {
     let (coarse, fine, finalists) = options.search;
     method.candidates().len() * coarse + finalists * fine
 }
 
-/// The best parameters of `method`; its own are not used.
+/// The best parameters of `method`; the ones it has are not used.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! A table of words and numbers, for people, spreadsheets and programs.
+//! A table of texts and numbers, for readers, spreadsheets and programs.
 
 use punctual_pictures::columns;
 use punctual_pictures::page::escape;
@@ -9,9 +9,9 @@ use serde::{Serialize, Serializer};
 pub enum Cell {
     /// A word.
     Text(String),
-    /// A number, and the digits that people see after the point.
+    /// A number, and its decimals for display.
     Number(f64, usize),
-    /// No number: the text that people see in its place.
+    /// No number; the text displayed instead.
     Nothing(&'static str),
 }
 
@@ -21,12 +21,12 @@ impl Cell {
         Self::Number(n as f64, 0)
     }
 
-    /// A number, or the text in its place.
+    /// A number, or the text displayed instead.
     pub fn optional(value: Option<f64>, digits: usize, nothing: &'static str) -> Self {
         value.filter(|v| v.is_finite()).map_or(Self::Nothing(nothing), |v| Self::Number(v, digits))
     }
 
-    /// The text that people see.
+    /// The text for display.
     pub fn shown(&self) -> String {
         match self {
             Self::Text(text) => text.clone(),
@@ -36,7 +36,7 @@ impl Cell {
         }
     }
 
-    /// The text in a CSV file: numbers in full.
+    /// The text in a CSV file, with numbers in full.
     fn plain(&self) -> String {
         match self {
             Self::Text(text) if text.contains([',', '"', '\n']) => {
@@ -81,7 +81,7 @@ pub struct Table {
     pub title: String,
     /// Runs, seeds, steps, and what the numbers mean.
     pub notes: Vec<String>,
-    /// The heads of the columns, with units.
+    /// The column headings, with units.
     pub header: Vec<String>,
     /// The rows, each as long as the header.
     pub rows: Vec<Vec<Cell>>,
@@ -104,7 +104,7 @@ impl Table {
         self.rows.iter().any(|row| matches!(row.get(column), Some(Cell::Number(..))))
     }
 
-    /// The table as text: columns lined up, under the title and its notes.
+    /// The table as text: aligned columns under the title and its notes.
     pub fn text(&self) -> String {
         let mut rows = vec![self.header.clone()];
         rows.extend(self.rows.iter().map(|row| row.iter().map(Cell::shown).collect()));
@@ -113,7 +113,7 @@ impl Table {
         format!("{}\n{notes}\n{}\n", self.title, columns::table(&rows, &right))
     }
 
-    /// The table as CSV: a header and rows, numbers in full.
+    /// The table as CSV: a header and rows, with numbers in full.
     pub fn csv(&self) -> String {
         let header = self.header.iter().map(|head| Cell::Text(head.clone()).plain()).collect::<Vec<_>>();
         let rows = self.rows.iter().map(|row| row.iter().map(Cell::plain).collect::<Vec<_>>());

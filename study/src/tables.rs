@@ -1,4 +1,4 @@
-//! The tables: the paper's three, the methods on the same starts, other seeds.
+//! The tables: the paper's three, the methods on the same starts, and other seeds.
 
 use punctual_cosim::error::Error;
 use rayon::prelude::*;
@@ -12,7 +12,7 @@ use super::{Options, Watch, always, search};
 
 /// Deadline of the random starts in s.
 const RANDOM: f64 = 5.0;
-/// Sampling periods at which other seeds are run, in s.
+/// Sampling period of the runs with other seeds, in s.
 const SEED_STEP: f64 = 0.01;
 
 /// A method with its parameters in one setting, and the outcome of its runs.
@@ -34,7 +34,7 @@ impl Row {
         self.count(|o| o.by(t))
     }
 
-    /// The value at `part` of the sorted ones.
+    /// The quantile at `part` of the values.
     fn quantile(&self, part: f64, value: impl Fn(&Outcome) -> f64) -> f64 {
         let mut values: Vec<f64> = self.outcomes.iter().map(value).collect();
         values.sort_by(f64::total_cmp);
@@ -51,7 +51,7 @@ fn settings() -> [Setup; 2] {
     [Setup::paper(RANDOM, STEP), Setup::advised(RANDOM, STEP)]
 }
 
-/// The methods of the main table without parameters, in one setting.
+/// The parameter-free methods of the main table, in one setting.
 fn fixed(setup: &Setup) -> Vec<Baseline> {
     if setup.is_advised() {
         vec![Baseline::RepeatedRoot, Baseline::ProfilePointwise, Baseline::Profile]
@@ -60,7 +60,7 @@ fn fixed(setup: &Setup) -> Vec<Baseline> {
     }
 }
 
-/// Number of loops that [`all`] runs.
+/// Number of closed loops that [`all`] runs.
 pub(super) fn loops(options: &Options) -> usize {
     let mut loops = 0;
     for setup in settings() {
@@ -71,7 +71,7 @@ pub(super) fn loops(options: &Options) -> usize {
     loops + Vehicle::ALL.len() * options.seeds as usize * options.runs + always::loops(options)
 }
 
-/// All tables, and whether ours kept every deadline in them.
+/// All tables, and whether our method kept every deadline in them.
 pub(super) fn all(options: &Options, watch: &Watch) -> Result<(Vec<Table>, bool), Error> {
     let rows = methods(options, watch)?;
     let ours = |row: &&Row| row.setup.is_advised() && row.baseline == Baseline::Profile;
@@ -107,8 +107,8 @@ fn methods(options: &Options, watch: &Watch) -> Result<Vec<Row>, Error> {
             }
         }
     }
-    // Times are measured after all that runs in parallel: then this program has the machine to itself, as far as
-    // it can see to it.
+    // Times are measured after all parallel runs, so that this program has the machine to itself as far as it
+    // can.
     if options.timed {
         for row in &mut rows {
             let x0 = starts.first().copied().unwrap_or_default();
@@ -185,10 +185,10 @@ pub(super) fn discretisation(options: &Options) -> Result<Table, Error> {
     Ok(table)
 }
 
-/// Runs on time, and by 1.5 T, of 100, in the paper.
+/// Runs on time, and by 1.5 T, out of 100, in the paper.
 const PAPER_COUNTS: [[usize; 2]; 3] = [[99, 100], [1, 100], [5, 99]];
 
-/// The runs of a table, in words.
+/// The runs of a table, as text.
 fn runs(options: &Options) -> String {
     format!(
         "{} starts (tests/data/starts100.csv), T = {RANDOM} s, step {STEP} s, RK4, to {} s.",
@@ -287,7 +287,7 @@ fn comparison(rows: &[Row], options: &Options) -> Table {
 }
 
 fn every_method(rows: &[Row], options: &Options) -> Table {
-    // The head, and the conditions of the runs.
+    // The header, and the conditions of the runs.
     let mut table = Table::new(
         "methods",
         "Every method on the same random starts",

@@ -39,14 +39,14 @@ pub struct Outcome {
     pub longest: f64,
     /// ∫‖u‖² dt up to the arrival, or the end.
     pub effort: f64,
-    /// The same to the end of the run.
+    /// The same, to the end of the run.
     pub whole_effort: f64,
     /// Largest |u_1| and |u_2| of the whole run.
     pub whole_peak: [f64; 2],
     /// Largest ‖u‖ of the whole run.
     pub whole_longest: f64,
-    /// Largest fall of h below its promised bound, up to the deadline, in the unit of h. For ours the bound is r
-    /// + μ without the part of μ that compensation adds.
+    /// Largest shortfall of h below its promised bound, up to the deadline, in the unit of h. For our method
+    /// the bound is r + μ without the part of μ that compensation adds.
     pub shortfall: f64,
     /// The part of the margin that compensation adds, in the unit of h.
     pub added: f64,
@@ -71,7 +71,7 @@ pub struct Measured {
 }
 
 impl Default for Outcome {
-    /// The outcome of no sample.
+    /// The outcome before any sample.
     fn default() -> Self {
         Self {
             arrival: None,
@@ -91,7 +91,7 @@ impl Default for Outcome {
 }
 
 impl Outcome {
-    /// Takes in the next sample of a loop that was run with `setup`.
+    /// Adds the next sample of a loop that runs with `setup`.
     pub fn take(&mut self, setup: &Setup, sample: &Measured) {
         let Measured { t, position, u, h, .. } = *sample;
         let before = self.arrival.is_none();
@@ -101,14 +101,14 @@ impl Outcome {
         }
         self.whole_longest = self.whole_longest.max(elementary::hypot(u[0], u[1]));
         self.whole_effort += (u[0] * u[0] + u[1] * u[1]) * setup.step;
-        // The arrival's own sample already belongs to the time inside.
+        // The arrival's own sample already counts as inside.
         if before && self.arrival.is_none() {
             (self.peak, self.longest, self.effort) = (self.whole_peak, self.whole_longest, self.whole_effort);
         }
         self.unmet += usize::from(!sample.satisfied);
         // Compares half a step early, so that round-off in t cannot skip the sample at the deadline.
         if t > setup.deadline - setup.step / 2.0 {
-            // Not `f64::min`, which drops a value that is not a number.
+            // Not `f64::min`, which drops a NaN.
             let depth = RADIUS - elementary::hypot(position[0] - CENTRE[0], position[1] - CENTRE[1]);
             self.least_h = if h < self.least_h || h.is_nan() { h } else { self.least_h };
             self.least_depth =
@@ -172,7 +172,7 @@ pub fn observed(
     Ok(out)
 }
 
-/// [`observed`], unobserved.
+/// Like [`observed`], without an observer.
 ///
 /// # Errors
 ///
@@ -181,7 +181,7 @@ pub fn run(vehicle: Vehicle, baseline: Baseline, setup: &Setup, x0: [f64; 4]) ->
     observed(vehicle, baseline, setup, x0, |_| {})
 }
 
-/// Mean time in s of a filter's step, along the states of the loop from `x0`: the least of several passes.
+/// Mean time in s of a filter's step, along the states of the loop from `x0`; the least of several passes.
 ///
 /// # Errors
 ///

@@ -14,7 +14,7 @@ pub(crate) const OK: Status = fmi2::Status::OK.0;
 pub(crate) const DISCARD: Status = fmi2::Status::DISCARD.0;
 pub(crate) const ERROR: Status = fmi2::Status::ERROR.0;
 
-/// A logger that takes the five fixed arguments only.
+/// A logger that only takes the five fixed arguments.
 type FixedLogger = extern "C" fn(*mut c_void, Text, c_int, Text, Text);
 
 /// Callbacks with a logger and its environment.
@@ -36,8 +36,8 @@ pub(crate) fn callbacks(logger: FixedLogger, environment: *mut c_void) -> Callba
 
 macro_rules! api {
     ($($field:ident $type:ident $symbol:ident ($($argument:ty),*) -> $result:ty;)*) => {
-        /// The functions. They are declared safe so that tests read as tests. Each keeps the contract of the
-        /// standard, or breaks it only where the library promises to survive.
+        /// The functions. They are declared safe so that the tests stay readable. Each call satisfies the
+        /// contract of the standard, or violates it only where the library promises to survive.
         pub(crate) struct Api {
             $(pub(crate) $field: extern "C" fn($($argument),*) -> $result,)*
             _library: libloading::Library,

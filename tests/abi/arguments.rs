@@ -1,4 +1,4 @@
-//! NULL arrays, value references, ranges; and that a failed call changes nothing.
+//! NULL arrays, value references and ranges; and a failed call changes nothing.
 
 use std::ptr::{null, null_mut};
 
@@ -69,7 +69,7 @@ fn null_arrays_of_some_elements_are_errors() {
     assert_eq!(message, format!("fmi2GetReal: vr cannot have {} elements", usize::MAX));
 }
 
-/// Each variable through each of the four getters and setters: only those of its type take it.
+/// Each variable through each of the four getters and setters: only those of its type accept it.
 #[test]
 fn value_references_of_the_wrong_type() {
     for configuration in [FILTER, PLANT] {
@@ -163,7 +163,7 @@ fn parameters_are_fixed_after_initialization() {
     }
 }
 
-/// A call with one bad element changes nothing, wherever the bad one stands.
+/// A call with one bad element changes nothing, wherever the bad element is.
 #[test]
 fn a_failed_call_changes_nothing() {
     let fmu = Fmu::new(FILTER);
@@ -239,7 +239,7 @@ fn parameters_outside_their_range() {
     assert_eq!(message, "fmi2SetReal: u_max.u_x: is 2e30, must be finite and >= -1e30 and <= 1e30");
 }
 
-/// Parameters that contradict each other can only be judged together, when initialization ends.
+/// Contradictory parameters can only be judged together, when initialization ends.
 #[test]
 fn contradicting_bounds_end_the_initialization_with_an_error() {
     let fmu = Fmu::new(FILTER);
@@ -248,12 +248,12 @@ fn contradicting_bounds_end_the_initialization_with_an_error() {
     slave.set("u_min.u_x", 60.0);
     slave.ok((API.enter_initialization_mode)(c));
     slave.set_inputs(&[0.0, 0.0]);
-    // Reading outputs is no error in between: getters never fail.
+    // Reading outputs in between is no error, since getters never fail.
     slave.real("u.u_x");
     let message = slave.refused((API.exit_initialization_mode)(c));
     let wanted = "fmi2ExitInitializationMode: bounds.u_x: is [60, 50], must be [min, max] with min <= max (in an FMU: u_min.u_x, u_max.u_x)";
     assert_eq!(message, wanted);
-    // Still in initialization mode, where it can be put right.
+    // Still in initialization mode, where it can be corrected.
     slave.set("u_max.u_x", 70.0);
     slave.ok((API.exit_initialization_mode)(c));
     slave.step(0.0, 0.1);
@@ -261,7 +261,7 @@ fn contradicting_bounds_end_the_initialization_with_an_error() {
     assert!((60.0..=70.0).contains(&u), "u_x is {u}");
 }
 
-/// Noise of another seed from then on, and of the first one where its state is restored.
+/// After a change of seed the noise differs, and a restored state brings the first seed's noise back.
 #[test]
 fn the_seed_of_a_disturbance_may_change_in_a_run() {
     let disturbed = format!("{PLANT}\n[disturbance]\nseed = 3\nmeasurements = {{ v = 1.0 }}\n");

@@ -1,5 +1,5 @@
-//! A filter that is armed later than at its first step: what it shows until then, and states, resets, re-armings and
-//! derivatives on either side.
+//! A filter that is armed later than at its first step: what it shows until then, and states, resets,
+//! re-armings and derivatives before and after.
 
 use punctual_core::filter::{AssuranceStatus, Phase, Status};
 
@@ -7,7 +7,7 @@ use crate::api::API;
 use crate::fmu::{FILTER, Fmu};
 use crate::slave::Slave;
 
-/// With plans, on 10 ms.
+/// With backup plans and a period of 10 ms.
 const PLANS: &str = r#"
 kind = "filter"
 assurance = "on"
@@ -22,7 +22,7 @@ radius = 2.0
 deadline = 6.0
 "#;
 
-/// The lengths of steps of a master with a mind of its own.
+/// The irregular step lengths of a master.
 const STEPS: [f64; 8] = [0.1, 0.05, 0.0, 0.13, 0.02, 0.07, 0.1, 0.11];
 const AFTER: f64 = 0.3;
 
@@ -34,7 +34,7 @@ fn armed_later() -> String {
     FILTER.replace("kind = \"filter\"", "kind = \"filter\"\narm_after = 0.3")
 }
 
-/// Steps from `t`, in which the steps number `from` to `to` are made; returns the time after them.
+/// Makes the steps number `from` to `to`, starting at `t`; returns the time after them.
 fn drive(slave: &Slave, mut t: f64, from: usize, to: usize) -> f64 {
     for k in from..to {
         let h = STEPS[k % STEPS.len()];
@@ -45,7 +45,8 @@ fn drive(slave: &Slave, mut t: f64, from: usize, to: usize) -> f64 {
     t
 }
 
-/// Asserts what is shown before the filter is armed: `u_ref` within its bounds, and nothing promised, in every variable.
+/// Asserts the outputs before the filter is armed: `u_ref` within its bounds, and nothing promised, in every
+/// variable.
 fn assert_not_armed(slave: &Slave, t: f64) {
     let [.., wish, down] = inputs(t);
     assert_eq!(
@@ -90,7 +91,8 @@ fn it_waits_from_the_first_step_on_and_then_is_a_fresh_filter() {
     assert!(slave.real("goal.time_left") > 0.0);
 }
 
-/// Set as a parameter, as in the file; one that outlasts the run never asks for anything.
+/// Set as a parameter, it works as in the file; a filter that is armed after the end of the run never
+/// requires anything.
 #[test]
 fn a_parameter_says_when() {
     let fmu = Fmu::new(FILTER);
@@ -110,7 +112,7 @@ fn a_parameter_says_when() {
         t = drive(&slave, t, k, k + 1);
         assert_not_armed(&slave, from);
     }
-    // A reset takes the parameter back, and the wait with it.
+    // A reset restores the parameter and the waiting time.
     slave.ok((API.reset)(slave.component));
     slave.initialize();
     slave.set_inputs(&inputs(0.0));
@@ -181,7 +183,8 @@ fn plans_are_decided_on_at_the_armed_step() {
         if k < 3 {
             assert_eq!([slave.real("u.u_x"), slave.real("u.u_y")], [8.0, 0.0]);
         }
-        // It stands still although it was told to move, so the guarantee is lost in the end; not before it was given.
+        // It does not move although it was told to, so the guarantee is finally lost, but not before it was
+        // given.
         if wanted == AssuranceStatus::Assured {
             break;
         }
@@ -193,7 +196,7 @@ fn plans_are_decided_on_at_the_armed_step() {
 fn derivatives_are_those_of_what_is_shown() {
     let fmu = Fmu::new(&armed_later());
     let slave = Slave::ready(&fmu);
-    // The first wish exceeds its bounds.
+    // The first u_ref exceeds its bounds.
     slave.set_inputs(&[1.0, 0.5, 2.0, 1.0, 70.0, -5.0]);
     let outputs = ["u.u_x", "u.u_y", "goal.h", "goal.slack", "goal.profile"].map(|name| fmu.reference(name));
     let derivative = |known: &str| {

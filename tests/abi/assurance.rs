@@ -1,4 +1,5 @@
-//! A filter that follows plans: the filter of the core bit for bit, plans in states, what the log says, and derivatives.
+//! A filter that follows plans: bitwise the filter of the core; plans in states, log messages, and
+//! derivatives.
 
 use punctual_core::filter::{AssuranceStatus, Status};
 
@@ -9,7 +10,7 @@ use crate::states::{LENGTH, sealed};
 
 const STEP: f64 = 0.05;
 
-/// A goal that is reached in time, and an obstacle on the way; u_ref drives into it.
+/// A goal that can be reached in time, and an obstacle on the way, into which u_ref drives.
 const ASSURED: &str = r#"
 kind = "filter"
 assurance = "on"
@@ -29,7 +30,7 @@ radius = 2.0
 "#;
 const HOSTILE: [f64; 2] = [4.0, -1.0];
 
-/// The plant over one step, with an integrator of its own.
+/// The plant over one step, with a separate integrator.
 fn moved(x: [f64; 4], u: [f64; 2]) -> [f64; 4] {
     moved_at(x, |x| [x[3] * x[2].cos(), x[3] * x[2].sin(), u[1], u[0]])
 }
@@ -67,7 +68,7 @@ fn an_fmu_follows_plans_as_the_core_does() {
     let mut x = [0.0, 0.0, 1.0, 0.0];
     let mut backups = 0;
     for k in 0..220 {
-        // The time that the FMU has come to, by its own sum.
+        // The current time of the FMU, which it accumulates itself.
         let (t, mut u) = (slave.time(), [0.0; 2]);
         filter.expect_hold(Some(STEP)).expect("a hold");
         filter.step(t, &x, &HOSTILE, &mut u).expect("right lengths");
@@ -91,7 +92,8 @@ fn an_fmu_follows_plans_as_the_core_does() {
     assert_eq!(slave.log.messages(), [""; 0]);
 }
 
-/// The plan is part of the state: from bytes in another instance, every bit that follows is the same.
+/// The plan is part of the state: restored from bytes into another instance, everything that follows is
+/// bitwise the same.
 #[test]
 fn a_plan_is_saved_with_the_state() {
     let fmu = Fmu::new(ASSURED);
@@ -109,8 +111,8 @@ fn a_plan_is_saved_with_the_state() {
     assert_eq!(other.integer("assurance"), AssuranceStatus::Assured as i32);
 }
 
-/// The slip angle of a bicycle, integrated inside: plan and integral are saved together, and the promise is kept with the mean
-/// that the plant is given.
+/// The slip angle of a bicycle, integrated inside the filter: plan and integral are saved together, and the
+/// promise is kept with the mean angle that the plant receives.
 #[test]
 fn a_plan_is_saved_with_the_integral() {
     const LENGTH: f64 = 3.0;
@@ -159,20 +161,21 @@ deadline = 7.0
     assert_eq!(other.integer("assurance"), AssuranceStatus::Assured as i32);
 }
 
-/// Bytes of a plan that are no plan of this filter are refused; others keep inputs finite and within their bounds.
+/// Bytes that are not a plan of this filter are refused; other damaged plans keep inputs finite and within
+/// their bounds.
 #[test]
 fn damaged_plans_do_no_harm() {
     let fmu = Fmu::new(ASSURED);
     let slave = Slave::ready(&fmu);
     let (_, x) = drive(&slave, [0.0, 0.0, 1.0, 0.0], 0, 30);
     let bytes = slave.now();
-    // The plan state is the last part: most of the state.
+    // The plan state comes last and is the largest part of the state.
     let first = bytes.len() * 2 / 5;
     let (mut refused, mut taken) = (0, 0);
     for (n, at) in (first..bytes.len() - 20).step_by(97).enumerate() {
         let mut damaged = bytes.clone();
         match n % 4 {
-            // Not a number, wherever it begins.
+            // NaN, wherever it begins.
             0 => damaged[at..].iter_mut().take(16).for_each(|byte| *byte = 255),
             1 => damaged[at] = 0,
             2 => damaged[at] ^= 0x40,
@@ -212,7 +215,7 @@ fn what_is_not_promised_is_said_in_words() {
         "{message}"
     );
     assert_eq!(slave.log.entries()[0].category, "logStatusWarning");
-    // A new start decides again; somebody who carries the plant away ends the promise.
+    // Re-arming decides again; moving the plant from outside ends the guarantee.
     let fmu = Fmu::new(ASSURED);
     let slave = Slave::ready(&fmu);
     drive(&slave, [0.0, 0.0, 1.0, 0.0], 0, 3);
@@ -220,7 +223,7 @@ fn what_is_not_promised_is_said_in_words() {
     slave.step(3.0 * STEP, STEP);
     assert_eq!(slave.integer("assurance"), AssuranceStatus::Lost as i32);
     assert!(slave.log.messages()[0].starts_with("the guarantee is lost ("), "{:?}", slave.log.messages());
-    // Back again, it is given again, which is said once too.
+    // Once it is back, the guarantee is given again, which is also logged once.
     for k in 4..6 {
         sample(&slave, [0.0, 0.0, 1.0, 0.0]);
         slave.step(f64::from(k) * STEP, STEP);
@@ -228,13 +231,13 @@ fn what_is_not_promised_is_said_in_words() {
     }
     let said = slave.log.messages();
     assert!(said.len() == 2 && said[1].starts_with("the guarantee is regained"), "{said:?}");
-    // What is read ahead of the step that decides again is what the step says.
+    // A value read before the step that decides again equals that of the step.
     slave.set_flag("rearm", true);
     sample(&slave, [0.0, 0.0, 1.0, 0.0]);
     let read = (slave.integer("assurance"), slave.flag("goal.guaranteed"));
     assert_eq!(read, (AssuranceStatus::Assured as i32, true));
     slave.step(6.0 * STEP, STEP);
-    // A refused step has no plan behind its input.
+    // A refused step has no plan for its input.
     slave.refused(slave.try_step(7.0 * STEP, -1.0));
     assert!(
         slave.integer("assurance") == AssuranceStatus::Undecided as i32 && !slave.flag("goal.guaranteed")
@@ -248,8 +251,8 @@ fn what_is_not_promised_is_said_in_words() {
     assert_eq!(slave.integer("assurance"), AssuranceStatus::Irregular as i32);
 }
 
-/// A parameter may ask for what no plan accounts for: then nothing is promised, and the log says why. With `assurance = "on"`
-/// it is refused.
+/// A parameter may require something that plans do not support. Then nothing is promised, and the log says
+/// why. With `assurance = "on"` the parameter is refused.
 #[test]
 fn parameters_that_no_plan_accounts_for() {
     let erroneous = ASSURED
@@ -281,7 +284,7 @@ fn parameters_that_no_plan_accounts_for() {
     assert!(said.contains("assurance"), "{said}");
 }
 
-/// Derivatives are those of the piece in force, and refused where a plan is new.
+/// Derivatives are those of the piece in force, and are refused if a plan is new.
 #[test]
 fn derivatives_are_given_or_refused() {
     let (goal, _) = ASSURED.rsplit_once("[[barrier]]").expect("two barriers");
@@ -316,7 +319,8 @@ fn derivatives_are_given_or_refused() {
     assert!(given > 60 && backups > 5, "{given} given, {backups} of the plan, {refused} refused");
 }
 
-/// A vehicle that must not stop has no plan that ends at rest: it is promised until a time, which is saved with the state.
+/// A vehicle that must not stop has no plan that ends at rest. Its guarantee has an end, which is saved with
+/// the state.
 #[test]
 fn a_promise_with_an_end_tells_it() {
     let forwards = "[[barrier]]\nname = \"forwards\"\nshape = \"at_least\"\nstate = \"v\"\nbound = 0.5\n";
@@ -333,7 +337,7 @@ fn a_promise_with_an_end_tells_it() {
         assert!(now >= until && now > slave.time(), "from {until} to {now}");
         until = now;
     }
-    // More than the deadline and the horizon: it was put off.
+    // More than the deadline plus the horizon, so it was extended.
     assert!(until > 18.0, "{until}");
     other.restore(other.read(&slave.now()));
     assert_eq!(other.real("assured_until").to_bits(), until.to_bits());

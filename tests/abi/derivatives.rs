@@ -1,4 +1,4 @@
-//! Directional derivatives: against central differences of the outputs read, and those that are refused.
+//! Directional derivatives: compared with central differences of the outputs, and those that are refused.
 
 use std::ffi::c_int;
 use std::ptr::{null, null_mut};
@@ -79,8 +79,8 @@ fn get(slave: &Slave, references: &[u32]) -> Vec<f64> {
     values
 }
 
-/// Compares every real output by every real input, each seed alone, with differences of the outputs read. Leaves
-/// the inputs at `values`.
+/// Compares every real output and input, one seed at a time, with differences of the outputs. Leaves the
+/// inputs at `values`.
 fn compare(slave: &Slave, values: &[f64], when: &str) {
     let (inputs, outputs) = (reals(slave.fmu, Causality::Input), reals(slave.fmu, Causality::Output));
     for (i, input) in inputs.iter().enumerate() {
@@ -102,7 +102,7 @@ fn compare(slave: &Slave, values: &[f64], when: &str) {
             assert!(close, "{names:?} {when}: {} for {wanted}", found[k]);
         }
     }
-    // Linear in the seeds; the same input twice adds up.
+    // Linear in the seeds; repeated inputs add up.
     let [first, second] = [inputs[0], inputs[1]].map(|r| derivative(slave, &outputs, &[r], &[1.0]));
     let both = derivative(slave, &outputs, &[inputs[0], inputs[1], inputs[0]], &[2.0, -3.0, 0.5]);
     for (k, found) in both.iter().enumerate() {
@@ -136,11 +136,11 @@ fn of_a_filter_in_every_mode_that_has_them() {
         slave.set_flag("rearm", true);
         compare(&slave, values, "with a re-arming that is due");
         slave.set_flag("rearm", false);
-        // The wanted input is beyond the bounds.
+        // u_ref is beyond the bounds.
         let mut far = values.to_vec();
         *far.last_mut().unwrap() = 90.0;
         compare(&slave, &far, "with a bound that holds");
-        // An input that is not a number makes u a constant.
+        // An input that is NaN makes u constant.
         far[0] = f64::NAN;
         set(&slave, &inputs, &far);
         let outputs = reals(&fmu, Causality::Output);
@@ -152,7 +152,7 @@ fn of_a_filter_in_every_mode_that_has_them() {
     }
 }
 
-/// Plans and an integral: outputs of both kinds come after those of the barriers.
+/// Plans and an integral, whose outputs both come after those of the barriers.
 #[test]
 fn of_a_filter_with_plans_behind_an_integrator() {
     let planned = STEERED.replace("bounds = {", "bounds = { a = [-60.0, 60.0],");
@@ -163,7 +163,7 @@ fn of_a_filter_with_plans_behind_an_integrator() {
     for k in 0..5 {
         set(&slave, &reals(&fmu, Causality::Input), &values);
         slave.step(0.1 * f64::from(k), 0.1);
-        // Where the plant goes, in small steps.
+        // The motion of the plant, in small steps.
         let (a, beta) = (slave.real("u.a"), slave.real("u.beta"));
         for _ in 0..10_000 {
             let [_, _, theta, v, ..] = values;
@@ -176,8 +176,8 @@ fn of_a_filter_with_plans_behind_an_integrator() {
     assert_eq!(slave.integer("assurance"), 1, "assured");
 }
 
-/// Whatever is configured and whatever the state is, as a master asks that knows the model description alone: all outputs by
-/// all inputs, in initialization mode and before every step.
+/// In every configuration and state, as requested by a master that only knows the model description: all
+/// outputs with respect to all inputs, in initialization mode and before every step.
 #[test]
 fn are_given_at_every_step() {
     let rock = "[[barrier]]\nname = \"rock\"\nshape = \"obstacle\"\ncentre = [1.5, 0.5]\nradius = 1.0\n";
@@ -192,7 +192,7 @@ fn are_given_at_every_step() {
     let earliest = goal.replace("6.0", "0.7\nwhen_infeasible = \"earliest\"");
     let rated = rock.replace("radius", "stay_rate = 3.0\nmargin = 0.1\nradius");
     let (mut smooth, mut near, mut random) = (0_u32, 0_u32, Random(50));
-    // Whether a search holds something: a plan, or a later deadline.
+    // Whether a search keeps something: a plan, or a later deadline.
     for (held, text) in [
         (false, format!("{off}{unicycle}{goal}{rock}")),
         (false, format!("{off}{point}{goal}{rock}")),
@@ -213,7 +213,7 @@ fn are_given_at_every_step() {
             slave.ok((API.enter_initialization_mode)(slave.component));
             let mut values: Vec<f64> = inputs.iter().map(|_| 0.6 * random.number()).collect();
             for k in 0..4 {
-                // The origin at first, as start values say.
+                // At first the origin, as in the start values.
                 if k > 0 {
                     set(&slave, &inputs, &values);
                 }
@@ -321,7 +321,7 @@ fn what_cannot_be_asked() {
     }
     assert!(before == slave.now());
 
-    // No unknowns are allowed, with NULL then. No knowns mean no change.
+    // No unknowns are allowed, and then NULL. No knowns mean no change.
     let c = slave.component;
     slave.ok((API.directional_derivative)(c, null(), 0, null(), 0, null(), null_mut()));
     slave.ok((API.directional_derivative)(c, null(), 0, &x, 1, &1.0, null_mut()));

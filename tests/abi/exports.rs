@@ -28,7 +28,7 @@ fn all_75_functions_of_fmi3_resolve() {
 }
 
 /// Output of a tool of binutils on the library.
-fn told(tool: &str, arguments: &[&str]) -> String {
+fn tool_output(tool: &str, arguments: &[&str]) -> String {
     match Command::new(tool).args(arguments).arg(library_path()).output() {
         Ok(output) if output.status.success() => String::from_utf8(output.stdout).unwrap(),
         problem => panic!("this test needs {tool} of binutils: {problem:?}"),
@@ -37,7 +37,7 @@ fn told(tool: &str, arguments: &[&str]) -> String {
 
 #[test]
 fn nothing_else_is_exported() {
-    let text = told("nm", &["-D", "--defined-only"]);
+    let text = tool_output("nm", &["-D", "--defined-only"]);
     let found: BTreeSet<_> = text.lines().filter_map(|line| line.split_whitespace().last()).collect();
     let wanted: BTreeSet<_> = FUNCTIONS.iter().chain(fmi3::FUNCTIONS).copied().collect();
     assert_eq!(found, wanted);
@@ -48,7 +48,7 @@ fn nothing_else_is_exported() {
 #[test]
 fn a_glibc_of_2014_is_enough() {
     const NEWEST: [u32; 2] = [2, 17];
-    let text = told("readelf", &["--wide", "--version-info"]);
+    let text = tool_output("readelf", &["--wide", "--version-info"]);
     let versions = text.split_whitespace().filter_map(|word| word.strip_prefix("GLIBC_"));
     let parsed = versions.map(|v| v.split('.').map(|part| part.parse().unwrap()).collect::<Vec<u32>>());
     let needed: BTreeSet<_> = parsed.collect();
@@ -57,13 +57,14 @@ fn a_glibc_of_2014_is_enough() {
     assert!(newer.is_empty(), "add what needs {newer:?} to fmu/build.rs and fmu/src/abi/glibc.rs:\n{text}");
 }
 
-/// Nothing but parts of glibc: the unwinder is inside, and a panic is caught all the same (`panics` in `fmu/src/abi/guard`).
+/// It needs nothing but parts of glibc: the unwinder is linked in, and panics are still caught (`panics` in
+/// `fmu/src/abi/guard`).
 #[cfg(all(target_os = "linux", target_env = "gnu", target_arch = "x86_64"))]
 #[test]
 fn glibc_is_all_that_is_needed() {
     const PARTS: [&str; 5] =
         ["libc.so.6", "libm.so.6", "libdl.so.2", "libpthread.so.0", "ld-linux-x86-64.so.2"];
-    let text = told("readelf", &["--wide", "--dynamic"]);
+    let text = tool_output("readelf", &["--wide", "--dynamic"]);
     let needed = text.lines().filter(|line| line.contains("(NEEDED)"));
     let others: Vec<_> = needed.filter(|line| !PARTS.iter().any(|part| line.contains(part))).collect();
     assert!(others.is_empty(), "{others:?}");
@@ -128,7 +129,7 @@ fn a_null_component_is_an_error_everywhere() {
     assert_eq!(unsafe { *int }, 7, "nothing was written");
 }
 
-/// Importers load with `RTLD_NOW`: nothing may be left to be found later.
+/// Importers load with `RTLD_NOW`, so every symbol must resolve at once.
 #[cfg(unix)]
 #[test]
 fn loads_with_every_symbol_resolved_at_once() {

@@ -1,5 +1,5 @@
-//! A filter that is given the derivatives by a simulator that computes them: it gives the bits of the filter that
-//! has the model.
+//! A filter whose derivatives a simulator computes: it gives bitwise the results of the filter that has the
+//! model.
 
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ fn inputs(t: f64, x: &[f64; 4]) -> ([f64; 6], [f64; 7]) {
     ([x[0], x[1], x[2], x[3], u_ref[0], u_ref[1]], [h, dh, drift, d.row[0], d.row[1], u_ref[0], u_ref[1]])
 }
 
-/// The outputs that both have, with their bits.
+/// The common outputs, with their bits.
 fn outputs(slave: &Slave) -> Vec<String> {
     let output =
         |line: &String| line.starts_with("u.") || line.starts_with("status") || line.starts_with("goal.");
@@ -51,7 +51,7 @@ fn the_same_bits_as_the_filter_that_has_the_model() {
         given.set_inputs(&derivatives);
         assert_eq!(outputs(&given), outputs(&own), "before the step at {t}");
         if k == 100 {
-            // Far away and back: the promise is remembered, the rest is inputs.
+            // Far away and back: the promise is remembered, everything else comes from the inputs.
             let kept = given.state();
             given.set_inputs(&[-1.0, 5.0, 0.0, 1.0, 1.0, 0.0, 0.0]);
             given.step(t, 7.0);
@@ -90,7 +90,7 @@ fn what_is_no_number_is_an_invalid_input() {
     }
     slave.set_inputs(&good);
     assert_eq!((slave.integer("status"), slave.real("u.u_x")), (1, before));
-    // No input changes h. So the constraint cannot be met, and the filter says so.
+    // No input changes h, so the constraint cannot be met, and the filter reports so.
     slave.set_inputs(&[-30.0, 3.0, -0.5, 0.0, 0.0, -1.0, 1.0]);
     assert_eq!(slave.integer("status"), 3, "no_authority");
 }

@@ -1,4 +1,4 @@
-//! FMUs as an importer has extracted them: a `resources` folder, a GUID, and names of variables.
+//! FMUs as extracted by an importer: a `resources` folder, a GUID, and names of variables.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use punctual_fmu::configuration::{Configuration, FilterConfiguration, FmiVersion
 use punctual_fmu::product::{Item, Product};
 use tempfile::TempDir;
 
-/// A filter for the point mass with input bounds: its rows alone.
+/// A filter for the point mass with input bounds, which only uses its rows.
 pub(crate) const FILTER: &str = r#"
 kind = "filter"
 assurance = "off"
@@ -19,7 +19,7 @@ radius = 2.0
 deadline = 10.0
 "#;
 
-/// The same filter for a plant that is not known: its derivatives are inputs.
+/// The same filter for an unknown plant: its derivatives are inputs.
 pub(crate) const EXTERNAL: &str = r#"
 kind = "filter"
 bounds = { u_x = [-50.0, 50.0], u_y = [-40.0, 40.0] }
@@ -33,7 +33,7 @@ deadline = 10.0
 margin = 0.02
 "#;
 
-/// A filter that integrates the slip angle itself, with every number of the integrator in play.
+/// A filter that integrates the slip angle itself, with every setting of the integrator in use.
 pub(crate) const STEERED: &str = r#"
 kind = "filter"
 plant = { model = "bicycle_small_slip_rate", l_r = 1.5 }

@@ -40,7 +40,7 @@ impl Arguments {
         let callbacks = log.callbacks();
         let component = self.instantiate(&raw const callbacks);
         assert!(component.is_null());
-        // Without callbacks, or without a logger, there is nobody to tell, and still no crash.
+        // Without callbacks, or without a logger, there is nobody to tell, but it must not crash.
         assert!(self.instantiate(null()).is_null());
         let silent = Callbacks { logger: None, ..callbacks };
         assert!(self.instantiate(&raw const silent).is_null());
@@ -125,13 +125,13 @@ fn null_callbacks_and_null_logger_are_fine() {
     for callbacks in [null(), &raw const nobody] {
         let component = arguments.instantiate(callbacks);
         assert!(!component.is_null());
-        // A failure without anybody to tell.
+        // A failure without a logger.
         assert_eq!((API.do_step)(component, 0.0, 0.1, 0), ERROR);
         (API.free_instance)(component);
     }
 }
 
-/// The callbacks structure stays the importer's, who may free or overwrite it at once.
+/// The callbacks structure still belongs to the importer, who may free or overwrite it immediately.
 #[test]
 fn callbacks_are_copied() {
     let (fmu, log) = (Fmu::new(FILTER), Log::default());
@@ -155,7 +155,7 @@ fn instance_names_of_every_kind() {
     }
     let log = Arguments { name: None, logging: true, ..Arguments::of(&fmu) }.accepted();
     assert!(log.entries().iter().all(|e| e.instance.is_empty()), "{:?}", log.entries());
-    // Bytes that are not UTF-8 come back replaced.
+    // Bytes that are not UTF-8 are replaced.
     Arguments { name: c(*b"a\xffb"), logging: true, ..Arguments::of(&fmu) }.accepted();
 }
 
@@ -217,7 +217,7 @@ fn broken_configurations() {
         assert!(message.contains(wanted), "{message} should contain {wanted}");
         assert!(message.contains(file.to_str().unwrap()), "{message} should name the file");
     }
-    // Not text at all, and a folder in its place.
+    // A file that is not text, and a folder in its place.
     std::fs::write(&file, b"\xff\xfe\x00").unwrap();
     assert!(Arguments::of(&fmu).refused().contains("cannot read"));
     std::fs::remove_file(&file).unwrap();
@@ -234,7 +234,7 @@ fn an_edited_configuration_no_longer_fits_the_guid() {
     assert!(Arguments::of(&fmu).refused().contains("do not belong together"));
 }
 
-/// Only `resources/configuration.toml` is read, once: the folder may go away afterwards.
+/// Only `resources/configuration.toml` is read, once; the folder may then be removed.
 #[test]
 fn resources_are_not_needed_after_instantiation() {
     let fmu = Fmu::new(PLANT);
@@ -247,7 +247,7 @@ fn resources_are_not_needed_after_instantiation() {
     slave.step(0.0, 0.1);
 }
 
-/// Only `resources/` and `binaries/` are sure to be extracted, and files beside them are not ours.
+/// Only `resources/` and `binaries/` are certain to be extracted, and files beside them are not ours.
 #[test]
 fn the_model_description_beside_the_resources_is_never_read() {
     let fmu = Fmu::new(FILTER);

@@ -9,12 +9,12 @@ use crate::api::{API, DISCARD, ERROR, OK};
 use crate::fmu::{FILTER, Fmu, PLANT};
 use crate::slave::Slave;
 
-/// A function, its call in the table (`None`: legal in every mode), and its answer where legal: OK, or as its
-/// capability flag or meaning says.
+/// A function, its call in the table (`None`: legal in every mode), and its answer if it is legal: OK, or
+/// what its capability flag or meaning says.
 type Function = (&'static str, Option<Call>, fn(&Slave) -> c_int, c_int);
 
-/// Each function with arguments that are right for either FMU in every mode that allows it; reference 0
-/// is a real input of both.
+/// Each function with arguments that are valid for both FMUs in every mode that allows it; reference 0 is a
+/// real input of both.
 const FUNCTIONS: [Function; 30] = [
     ("fmi2SetDebugLogging", None, |s| (API.set_debug_logging)(s.component, 1, 0, null()), OK),
     (
@@ -110,7 +110,8 @@ fn into_mode(fmu: &Fmu, mode: Mode) -> Slave<'_> {
     slave
 }
 
-/// Goes on from `mode` by the calls that only this mode allows, to a step; returns all that was seen there.
+/// Continues from `mode` with the calls that only this mode allows, up to a step; returns everything
+/// observed.
 fn finish(slave: &Slave, mode: Mode) -> Vec<String> {
     let c = slave.component;
     if mode == Mode::TERMINATED {
@@ -207,12 +208,12 @@ fn setup_experiment_refuses_times_that_are_none() {
     assert_eq!(message, "fmi2SetupExperiment: stopTime is 1, must be >= startTime = 2");
     assert!(slave.refused(setup(2.0, f64::NAN)).contains("stopTime is NaN"));
     slave.ok(setup(-2.0, f64::INFINITY));
-    // A value that is not defined is not read.
+    // An undefined value is not read.
     slave.ok((API.setup_experiment)(slave.component, 0, f64::NAN, -2.5, 0, f64::NAN));
     assert_eq!(slave.time(), -2.5);
 }
 
-/// Values can be read after the end and never set; a reset starts again.
+/// Values can be read after termination but not set; a reset starts again.
 #[test]
 fn terminated() {
     let fmu = Fmu::new(FILTER);

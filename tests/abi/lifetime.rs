@@ -9,14 +9,14 @@ use crate::api::{API, Api, library_path};
 use crate::fmu::{FILTER, Fmu, PLANT};
 use crate::slave::Slave;
 
-/// The inputs of step `k`: all reals, 6 of a filter, 2 of a plant.
+/// The inputs of step `k`, all reals: 6 for a filter, 2 for a plant.
 fn inputs(k: usize, slave: &Slave) -> Vec<f64> {
     let s = k as f64;
     let inputs = [0.5 * s, 0.25, 1.0 - 0.1 * s, 2.0, 0.5, 0.75];
     inputs[..slave.fmu.product.layout.outputs.min(6)].to_vec()
 }
 
-/// Makes a run of `steps` steps with changing inputs; returns all that was seen on the way.
+/// Makes a run of `steps` steps with changing inputs; returns everything observed.
 fn run(slave: &Slave, steps: usize) -> Vec<Vec<String>> {
     let mut t = 0.0;
     (0..steps)
@@ -64,7 +64,7 @@ fn a_reset_instance_is_a_fresh_one() {
     }
 }
 
-/// Outputs read in initialization mode already belong to the start values, not to the run before.
+/// Outputs read in initialization mode already belong to the start values, not to the previous run.
 #[test]
 fn initialization_after_a_reset_is_that_of_a_fresh_instance() {
     for configuration in [FILTER, PLANT] {
@@ -151,7 +151,8 @@ fn threads() -> usize {
     std::fs::read_dir("/proc/self/task").unwrap().count()
 }
 
-/// The number of threads once it is `wanted`, or after ten seconds: one that is joined is listed until the system has removed it.
+/// The number of threads once it is `wanted`, or after ten seconds: a joined thread is listed until the
+/// system has removed it.
 fn threads_in_the_end(wanted: usize) -> usize {
     let begin = Instant::now();
     while threads() != wanted && begin.elapsed() < Duration::from_secs(10) {
@@ -164,8 +165,8 @@ fn is_mapped(path: &Path) -> bool {
     std::fs::read_to_string("/proc/self/maps").unwrap().contains(path.to_str().unwrap())
 }
 
-/// Runs by itself in a separate process, started by [`unloads_and_loads_again`]: counts of threads
-/// and mappings belong to the process.
+/// Runs alone in a separate process, started by [`unloads_and_loads_again`], since counts of threads and
+/// mappings belong to the process.
 #[test]
 #[ignore = "started by unloads_and_loads_again"]
 fn unloading_in_a_process_of_its_own() {
@@ -182,7 +183,7 @@ fn unloading_in_a_process_of_its_own() {
             slave.initialize();
             slave.step(0.0, 0.1);
             slave.refused(slave.try_step(-1.0, 0.1));
-            // Used and freed on a thread that ends, created on one that outlives the library.
+            // Used and freed on a thread that ends, and created on one that outlives the library.
             std::thread::scope(|scope| {
                 let used = scope.spawn(move || {
                     slave.step(0.1, 0.1);

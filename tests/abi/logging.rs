@@ -62,7 +62,7 @@ fn an_unknown_category_is_an_error_and_switches_nothing() {
     assert_eq!(slave.log.messages().len(), before, "events are still off");
 }
 
-/// Categories are those of the model description, and an ordinary run logs nothing unasked.
+/// Categories are those of the model description, and an ordinary run logs nothing unless requested.
 #[test]
 fn an_ordinary_run_is_silent_unless_asked() {
     for configuration in [FILTER, PLANT] {
@@ -84,7 +84,7 @@ fn an_ordinary_run_is_silent_unless_asked() {
     }
 }
 
-/// What switches plans off is a warning when the instance is made, which is made all the same.
+/// Whatever disables plans gives a warning at instantiation, which still succeeds.
 #[test]
 fn what_switches_plans_off_is_logged_once() {
     let declared = FILTER.replace("assurance = \"off\"", "actuation_delay = 0.001");
@@ -124,7 +124,7 @@ fn excluded_functions_name_their_flag() {
                 "fmi2GetRealOutputDerivatives",
                 "maxOutputDerivativeOrder is 0",
             ),
-            // The standard spells the flag so.
+            // The spelling of the standard.
             ((API.cancel_step)(c), "fmi2CancelStep", "canRunAsynchronuously is false"),
         ] {
             assert_eq!(status, ERROR, "{name}");
@@ -137,7 +137,7 @@ fn excluded_functions_name_their_flag() {
     }
 }
 
-/// Nothing is asynchronous: only the time and the end of the run have a status.
+/// Nothing is asynchronous, so only the time and the end of the run have a status.
 #[test]
 fn get_status_family() {
     let fmu = Fmu::new(PLANT);

@@ -1,7 +1,8 @@
 //! Masters that restore a state and then pass a time within the steps that this took back.
 //!
-//! MasterSim's error control does so: a step of h from t is tried, and again as two halves; where they differ too
-//! much, it restores the state of t but keeps the clock at t + h/2 for the first try with a shorter step.
+//! MasterSim's error control does so. It tries a step of h from t, and again as two halves. If they differ
+//! too much, it restores the state at t but leaves its clock at t + h/2 for the first try with a shorter
+//! step.
 
 use punctual_fmu::product::LOG_CATEGORIES;
 
@@ -13,7 +14,7 @@ use crate::slave::Slave;
 const CONTROLLER: &str = "kind = \"controller\"\nplant.model = \"unicycle\"\ncontroller = \"waypoints\"\n\
                           points = [[0.1, 0.0], [0.2, 0.1], [9.0, 4.0]]\nacceptance_radius = 0.5\n";
 
-/// Follows a plan, which the state holds too.
+/// Follows plans, which the state contains too.
 const ASSURED: &str = r#"
 kind = "filter"
 assurance = "on"
@@ -27,16 +28,17 @@ radius = 2.0
 deadline = 8.0
 "#;
 
-/// Asserts that the log holds one warning, about the first step of `slave` that was told `given` for `restored`.
+/// Asserts that the log has one warning, about the first step of `slave` that was given `given` instead of
+/// `restored`.
 fn warned(slave: &Slave, given: f64, restored: f64) {
     let entries = slave.log.entries();
     let start = format!("currentCommunicationPoint is {given}, must be the restored one, {restored}: ");
-    let told: Vec<_> = entries.iter().filter(|e| e.message.starts_with(&start)).collect();
-    let [entry] = told[..] else { panic!("{start} {entries:?}") };
+    let warnings: Vec<_> = entries.iter().filter(|e| e.message.starts_with(&start)).collect();
+    let [entry] = warnings[..] else { panic!("{start} {entries:?}") };
     assert_eq!((entry.status, entry.category.as_str()), (1, "logStatusWarning"));
     assert!(LOG_CATEGORIES.iter().any(|(name, _)| *name == entry.category));
     let others = entries.iter().filter(|e| e.message.contains("must be the restored one")).count();
-    assert_eq!(others, 1, "told once: {entries:?}");
+    assert_eq!(others, 1, "warned once: {entries:?}");
 }
 
 /// MasterSim's step with error control, call by call. `stale` is its clock after a failed try.
@@ -44,7 +46,7 @@ struct MasterSim<'a> {
     filter: Slave<'a>,
     plant: Slave<'a>,
     stale: bool,
-    /// Steps that were told a time in place of another.
+    /// Steps that were given a wrong time.
     mistimed: Vec<[f64; 2]>,
 }
 
@@ -53,7 +55,7 @@ impl<'a> MasterSim<'a> {
         Self { filter: Slave::ready(filter), plant: Slave::ready(plant), stale, mistimed: Vec::new() }
     }
 
-    /// Both FMUs in Gauss-Seidel order; the state that the plant then has.
+    /// Passes values between both FMUs in Gauss–Seidel order; returns the resulting state of the plant.
     fn exchange(&self, t: f64, h: f64) -> [f64; 4] {
         let x = self.x();
         self.filter.set_inputs(&[x[0], x[1], x[2], x[3], -x[3], 0.2]);
@@ -100,7 +102,7 @@ impl<'a> MasterSim<'a> {
     }
 }
 
-/// The whole run has the bits of a master whose clock is right, and each FMU warns once.
+/// The whole run is bitwise that of a master with a correct clock, and each FMU warns once.
 #[test]
 fn an_error_controlled_master_with_a_stale_clock() {
     let filter = Fmu::new(
@@ -119,7 +121,7 @@ fn an_error_controlled_master_with_a_stale_clock() {
         (t, h) = ends[0];
         steps += 1;
     }
-    // The first step too is tried in vain, where a plant takes any time as its start.
+    // The first step is also tried in vain, although a plant accepts any time as its start.
     assert!(stale.mistimed.len() > 5 && stale.mistimed[0][1] == 0.0, "{steps} steps, {:?}", stale.mistimed);
     let [given, restored] = stale.mistimed[0];
     for slave in [&stale.filter, &stale.plant] {
@@ -130,8 +132,8 @@ fn an_error_controlled_master_with_a_stale_clock() {
     }
 }
 
-/// Whatever time within the steps taken back is told, every FMU makes the step from the restored one, and takes the
-/// right times from there on.
+/// Given any time within the steps taken back, every FMU makes the step from the restored time, and accepts
+/// the correct times from there on.
 #[test]
 fn any_time_within_the_steps_taken_back() {
     let mut fmus = every_fmu();
@@ -155,7 +157,7 @@ fn any_time_within_the_steps_taken_back() {
             }
             for (slave, state) in slaves.iter().zip(states) {
                 slave.restore(state);
-                // A second one, and a refused step, change nothing.
+                // A second restore, and a refused step, change nothing.
                 if random.below(2) == 0 {
                     slave.restore(state);
                     slave.refused(slave.try_step(t, f64::NAN));
@@ -163,15 +165,15 @@ fn any_time_within_the_steps_taken_back() {
             }
             let late = (end - t) * [0.0, 0.25, 0.5, 1.0][random.below(4) as usize];
             // A nanosecond later is the same time.
-            let told = if late > 1.1e-9 { t + late } else { t };
+            let given = if late > 1.1e-9 { t + late } else { t };
             let step = Step::valid(&mut random, fmu);
-            for (slave, told) in [(right, t), (wrong, told)] {
+            for (slave, given) in [(right, t), (wrong, given)] {
                 step.begin(slave);
-                slave.step(told, step.h);
+                slave.step(given, step.h);
             }
-            wrongs += usize::from(told > t);
+            wrongs += usize::from(given > t);
             t += step.h;
-            assert_eq!(all(wrong), all(right), "{name}: step {k}, {told} in place of {t} - {}", step.h);
+            assert_eq!(all(wrong), all(right), "{name}: step {k}, {given} in place of {t} - {}", step.h);
             assert_eq!(wrong.time().to_bits(), right.time().to_bits());
         }
         assert!(wrongs > 5, "{name}: {wrongs}");
@@ -182,7 +184,7 @@ fn any_time_within_the_steps_taken_back() {
     }
 }
 
-/// A plant refuses what lies outside the steps taken back, and every wrong time at the second step.
+/// A plant refuses times outside the steps taken back, and every wrong time at the second step.
 #[test]
 fn a_plant_takes_no_other_time() {
     let fmu = Fmu::new(PLANT);
@@ -212,7 +214,8 @@ fn a_plant_takes_no_other_time() {
         assert!(message.contains("must be") && message.contains("the present one, 1.125"), "{message}");
     }
     slave.step(1.125, 0.125);
-    // A reset instance has made no step that a state from before could take back. A new run tells it again.
+    // After a reset, an instance has made no steps that an earlier state could take back. A new run warns
+    // again.
     slave.ok((API.reset)(slave.component));
     slave.restore(state);
     slave.refused(slave.try_step(1.25, 0.125));
@@ -227,7 +230,8 @@ fn a_plant_takes_no_other_time() {
     assert_eq!(warnings, 2);
 }
 
-/// A filter takes gaps. After a restore it does so beyond the steps taken back, and from the second step on.
+/// A filter accepts gaps. After a restore it does so beyond the steps taken back, and from the second step
+/// on.
 #[test]
 fn a_filter_still_takes_gaps() {
     let fmu = Fmu::new(FILTER);
@@ -240,7 +244,7 @@ fn a_filter_still_takes_gaps() {
     slave.refused(slave.try_step(0.75, 0.125));
     slave.step(1.75, 0.125);
     assert_eq!((slave.time(), slave.log.messages().len()), (1.875, 1));
-    // The steps after 1.75 do not follow from the state of 1.0: they are not those that are taken back.
+    // The steps after 1.75 do not follow from the state at 1.0, so they are not the ones taken back.
     slave.restore(state);
     slave.step(1.75, 0.125);
     assert_eq!((slave.time(), slave.log.messages().len()), (1.875, 1));
@@ -254,8 +258,8 @@ fn a_filter_still_takes_gaps() {
     assert_eq!(slave.time(), 1.375);
 }
 
-/// Times that would be right without a restore stay right with one: a first step anywhere, where no start time was
-/// told, and a clock that rounds.
+/// Times that are correct without a restore remain correct with one: a first step anywhere if no start time
+/// was given, and a clock that rounds.
 #[test]
 fn right_times_stay_right() {
     for configuration in [FILTER, PLANT] {
@@ -278,7 +282,7 @@ fn right_times_stay_right() {
             all(&slave)
         };
         assert_eq!(run(true), run(false));
-        // A run that starts over begins where it wants, also within the one before.
+        // A run that starts again may begin anywhere, even within the previous one.
         let slave = Slave::new(&fmu);
         let instantiated = slave.state();
         slave.initialize();
@@ -291,7 +295,8 @@ fn right_times_stay_right() {
     }
 }
 
-/// No more than a clock may round off in a plant, but the steps taken back had not begun late.
+/// The difference is no more than a plant allows for clock rounding, but the steps taken back had not begun
+/// late.
 #[test]
 fn a_wrong_time_close_to_the_right_one() {
     let (h, late) = (2.0_f64.powi(-9), 2.0_f64.powi(-10));
@@ -308,7 +313,8 @@ fn a_wrong_time_close_to_the_right_one() {
     }
 }
 
-/// A state has nothing of the steps that it took back: its bytes are the same, and another instance is strict.
+/// A state contains nothing about the steps that it took back: its bytes are the same, and another instance
+/// is strict.
 #[test]
 fn the_state_does_not_know() {
     let fmu = Fmu::new(PLANT);
@@ -324,7 +330,7 @@ fn the_state_does_not_know() {
     slave.step(1.25, 0.125);
     other.step(1.0, 0.125);
     assert_eq!(all(&slave), all(&other));
-    // Of the steps of another instance this one took none back.
+    // These are steps of another instance, so this one took none back.
     other.step(1.125, 4.0);
     slave.restore(slave.read(&other.now()));
     slave.step(5.125, 0.5);

@@ -1,4 +1,4 @@
-//! Lazy outputs of a filter: the inputs and the time that they belong to, and the samples that are remembered.
+//! Lazy outputs of a filter: the inputs and the time that they belong to, and which samples are remembered.
 //!
 //! The oracle is the filter of `punctual-core` with the same configuration.
 
@@ -47,8 +47,8 @@ fn outputs_follow_inputs_without_a_step() {
     }
 }
 
-/// A Jacobi master sets inputs, steps, reads; Gauss-Seidel reads before the step. Both see the same
-/// sample of the same inputs, only at other moments.
+/// A Jacobi master sets inputs, steps and reads; a Gauss–Seidel master reads before the step. Both see the
+/// same sample of the same inputs, only at different moments.
 #[test]
 fn the_order_of_reading_and_stepping_changes_nothing() {
     let fmu = Fmu::new(FILTER);
@@ -81,7 +81,7 @@ fn reading_twice_gives_the_same() {
     assert_eq!(slave.snapshot(), slave.snapshot());
 }
 
-/// Masters differ in what they feed before the first step; only the first step anchors.
+/// Masters differ in what they pass before the first step; only the first step anchors.
 #[test]
 fn the_anchor_is_the_first_step_whatever_came_before() {
     let fmu = Fmu::new(FILTER);
@@ -135,7 +135,7 @@ fn inputs_that_are_not_numbers() {
     }
 }
 
-/// In between, invalid inputs leave the promise as it was.
+/// Invalid inputs in between leave the promise unchanged.
 #[test]
 fn a_gap_of_invalid_inputs_forgets_nothing() {
     let fmu = Fmu::new(FILTER);
@@ -180,7 +180,7 @@ fn a_rising_edge_of_rearm_starts_the_deadline_anew() {
         slave.set_inputs(&inputs(k));
         slave.set_flag("rearm", rearm);
         let shown = slave.snapshot();
-        // Looking ahead over a re-arming must not re-arm: look, take it back, look again.
+        // Looking ahead over a re-arming must not re-arm: look, undo it, look again.
         slave.set_flag("rearm", !rearm);
         slave.snapshot();
         slave.set_flag("rearm", rearm);
@@ -197,7 +197,7 @@ fn a_rising_edge_of_rearm_starts_the_deadline_anew() {
     }
 }
 
-/// Parameters reach the filter, whenever they are set before the end of the initialization.
+/// Parameters take effect whenever they are set before the end of the initialization.
 #[test]
 fn parameters_in_every_mode_before_the_steps() {
     let fmu = Fmu::new(FILTER);

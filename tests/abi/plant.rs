@@ -45,7 +45,8 @@ fn steps_are_those_of_core() {
     }
 }
 
-/// With the input held and the same inner steps, the division of a time into communication steps leaves no trace.
+/// With the input held and the same inner steps, how a time is divided into communication steps has no
+/// effect.
 #[test]
 fn one_step_or_several_of_the_same_inner_steps() {
     let fmu = Fmu::new(PLANT);
@@ -63,8 +64,8 @@ fn one_step_or_several_of_the_same_inner_steps() {
     assert!(found.windows(2).all(|pair| pair[0] == pair[1]), "{found:?}");
 }
 
-/// Number of inner steps for a communication step: the least that are not longer than the inner step,
-/// where longer by round-off does not count.
+/// Number of inner steps in a communication step: the smallest for which they are not longer than the inner
+/// step, apart from round-off.
 #[test]
 fn inner_steps_divide_the_communication_step() {
     let fmu = Fmu::new(&PLANT.replace("0.0009765625", "0.01"));
@@ -88,7 +89,7 @@ fn inner_steps_divide_the_communication_step() {
     }
 }
 
-/// Outputs do not follow inputs without a step.
+/// Outputs do not depend on inputs without a step.
 #[test]
 fn outputs_are_the_state() {
     let fmu = Fmu::new(PLANT);
@@ -148,7 +149,7 @@ fn states_that_become_infinite() {
     slave.step(0.0, 1.0);
 }
 
-/// A step of more inner steps than anybody waits for is refused at once.
+/// A step with an excessive number of inner steps is refused immediately.
 #[test]
 fn huge_steps() {
     let fmu = Fmu::new(PLANT);

@@ -1,6 +1,6 @@
-//! Going back to a snapshot and on again: the same bits as without.
+//! Restoring a snapshot and continuing gives the same bits as never going back.
 //!
-//! The tests compare every variable and the bytes of the state, which hold all that is remembered.
+//! The tests compare every variable and the bytes of the state, which contain everything that is remembered.
 
 use punctual_modeldescription::{BaseType, Causality};
 
@@ -20,7 +20,8 @@ const MODELS: [&str; 8] = [
     "bicycle_kinematic_slip",
 ];
 
-/// A filter with two barriers that conflict at times, recoveries and anchors; measured periods. Its rows alone.
+/// A filter with two barriers that conflict at times, recoveries and anchors, and measured periods. It only
+/// uses its rows.
 const CONFLICTS: &str = r#"
 kind = "filter"
 assurance = "off"
@@ -40,7 +41,7 @@ radius = 0.75
 deadline = 1.0
 "#;
 
-/// A disturbance of the unicycle, with values that last longer than some steps and shorter than others.
+/// A disturbance of the unicycle, with a period longer than some steps and shorter than others.
 const DISTURBANCE: &str = "[disturbance]
 seed = 7
 period = 0.02
@@ -114,7 +115,7 @@ impl Step {
         Self { inputs, rearm, look: random.below(2) == 0, h: random.step() }
     }
 
-    /// One that no FMU refuses.
+    /// A step that no FMU refuses.
     pub(crate) fn valid(random: &mut Random, fmu: &Fmu) -> Self {
         let mut step = Self::new(random, fmu);
         step.inputs.iter_mut().filter(|input| input.is_nan()).for_each(|input| *input = 0.0);
@@ -159,21 +160,22 @@ fn values(slave: &Slave) -> Vec<u64> {
     bits
 }
 
-/// All visible values, and all that is remembered.
+/// All visible values, and everything that is remembered.
 pub(crate) fn all(slave: &Slave) -> (Vec<u64>, Vec<u8>) {
     (values(slave), slave.now())
 }
 
-/// Number of snapshot points of one FMU: its part of `PUNCTUAL_SNAPSHOTS`, or of 10,000, fewer in a debug build.
+/// Number of snapshot points per FMU: its share of `PUNCTUAL_SNAPSHOTS`, or of 10,000; fewer in a debug
+/// build.
 fn snapshots(fmus: usize) -> usize {
     let default = if cfg!(debug_assertions) { 2_000 } else { 10_000 };
     let all: usize = std::env::var("PUNCTUAL_SNAPSHOTS").map_or(default, |n| n.parse().expect("a number"));
     all.div_ceil(fmus)
 }
 
-/// Takes snapshots at random places of a run, also between inputs and step. Then makes some steps that are thrown
-/// away, and goes on beside an instance that never went back. The snapshot is used as it is, or as bytes, or in
-/// an instance that was new.
+/// Takes snapshots at random points of a run, also between inputs and step. Then makes some steps that are
+/// discarded, and continues in parallel with an instance that never went back. The snapshot is used directly,
+/// or as bytes, or in a new instance.
 #[test]
 #[expect(clippy::print_stdout, reason = "the number of points is the result")]
 fn random_snapshots() {
@@ -186,7 +188,7 @@ fn random_snapshots() {
         let mut back = Slave::ready(fmu);
         let (mut t, mut kept) = (0.0, back.state());
         for point in 0..count {
-            // A plant must not run away.
+            // A plant must not diverge.
             if point % 100 == 0 {
                 t = 0.0;
                 for slave in [&straight, &back] {
@@ -239,7 +241,7 @@ fn random_snapshots() {
     println!("{points} snapshots in {} FMUs", fmus.len());
 }
 
-/// Two instances step in turns and change places at every step by their states.
+/// Two instances step alternately and swap their states at every step.
 #[test]
 fn two_instances_that_change_places() {
     for fmu in every_fmu() {
@@ -320,8 +322,8 @@ fn every_mode_into_a_fresh_instance() {
     }
 }
 
-/// A master tries long steps of both FMUs, and throws them away where it does not like them. It goes on with
-/// short ones, the same as a master that knew which steps it would take.
+/// A master tries long steps of both FMUs, and discards those it rejects. It continues with short ones, with
+/// the same results as a master that knew its steps in advance.
 #[test]
 fn an_adaptive_master() {
     let (filter, plant) = (Fmu::new(CONFLICTS), Fmu::new(PLANT));
@@ -360,7 +362,7 @@ fn an_adaptive_master() {
     assert_eq!((all(&f), all(&p)), (all(&straight_f), all(&straight_p)));
 }
 
-/// Importers pass true while they roll back, and false while they do not.
+/// Importers pass true while they roll back, and false otherwise.
 #[test]
 fn no_set_fmu_state_prior_to_current_point_is_ignored() {
     for configuration in [FILTER, PLANT] {

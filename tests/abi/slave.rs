@@ -39,7 +39,7 @@ impl Log {
         last.message
     }
 
-    /// Callbacks with this log, and without anything that may be NULL.
+    /// Callbacks with this log, and with NULL wherever it is allowed.
     pub(crate) fn callbacks(&self) -> Callbacks {
         callbacks(log, std::ptr::from_ref(self).cast_mut().cast())
     }
@@ -62,7 +62,7 @@ extern "C" fn log(environment: *mut c_void, instance: Text, status: c_int, categ
     });
 }
 
-/// An instance; freed when dropped, in whatever mode it is.
+/// An instance; freed when dropped, in any mode.
 pub(crate) struct Slave<'a> {
     pub(crate) component: Component,
     pub(crate) log: Box<Log>,
@@ -89,7 +89,7 @@ impl<'a> Slave<'a> {
         Self::from(&API, fmu)
     }
 
-    /// An instance of a library of its own.
+    /// An instance of a separately loaded library.
     pub(crate) fn from(api: &'a Api, fmu: &'a Fmu) -> Self {
         let log = Box::<Log>::default();
         let callbacks = log.callbacks();
@@ -173,14 +173,14 @@ impl<'a> Slave<'a> {
         self.ok(self.try_step(t, h));
     }
 
-    /// `fmi2LastSuccessfulTime`: the present communication point.
+    /// `fmi2LastSuccessfulTime`: the current communication point.
     pub(crate) fn time(&self) -> f64 {
         let mut value = f64::NAN;
         self.ok((self.api.get_real_status)(self.component, 2, &raw mut value));
         value
     }
 
-    /// A new state; the instance frees it at the latest.
+    /// A new state, which the instance frees if nothing else does.
     pub(crate) fn state(&self) -> State {
         let mut state = std::ptr::null_mut();
         self.ok((self.api.get_state)(self.component, &raw mut state));
@@ -201,7 +201,7 @@ impl<'a> Slave<'a> {
         bytes
     }
 
-    /// The present state as bytes: every bit that the instance remembers.
+    /// The current state as bytes: everything that the instance remembers.
     pub(crate) fn now(&self) -> Vec<u8> {
         let mut state = self.state();
         let bytes = self.bytes(state);
@@ -209,7 +209,7 @@ impl<'a> Slave<'a> {
         bytes
     }
 
-    /// The answer to bytes that may be no state, and the state.
+    /// The answer to bytes that may not be a state, and the state.
     pub(crate) fn try_read(&self, bytes: &[u8]) -> (c_int, State) {
         let mut state = std::ptr::null_mut();
         let status =
@@ -224,7 +224,7 @@ impl<'a> Slave<'a> {
         state
     }
 
-    /// Every variable with the bits of its value, as text that a failed assertion shows well.
+    /// Every variable with the bits of its value, as readable text for failed assertions.
     pub(crate) fn snapshot(&self) -> Vec<String> {
         let value = |v: &punctual_modeldescription::Variable| match v.kind.base_type() {
             BaseType::Real => {
@@ -237,7 +237,7 @@ impl<'a> Slave<'a> {
         self.fmu.product.variables.iter().map(|v| format!("{}: {}", v.name, value(v))).collect()
     }
 
-    /// Expected [`Self::snapshot`] after a refused step, where it was `before` until then. A filter shows the
+    /// The expected [`Self::snapshot`] after a refused step, given the one `before` it. A filter shows the
     /// refusal in `status` (4: `invalid_input`) and `u`; a plant cannot.
     pub(crate) fn after_refusal(before: &[String]) -> Vec<String> {
         let filter = before.iter().any(|line| line.starts_with("status: "));

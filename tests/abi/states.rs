@@ -1,4 +1,4 @@
-//! States: their bytes, their lifetime, and bytes that are no state.
+//! States: their bytes, their lifetime, and bytes that are not a state.
 
 use std::ffi::c_void;
 use std::ptr::{null, null_mut};
@@ -7,7 +7,7 @@ use crate::api::API;
 use crate::fmu::{FILTER, Fmu, PLANT};
 use crate::slave::Slave;
 
-/// Positions of the parts of a state, as `fmu/src/state.rs` has them.
+/// Positions of the parts of a state, as in `fmu/src/state.rs`.
 const VERSION: usize = 8;
 const GUID: usize = 12;
 pub(crate) const LENGTH: usize = 50;
@@ -33,7 +33,7 @@ pub(crate) fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
     bytes
 }
 
-/// `bytes` with `part` at `place`.
+/// `bytes` with `part` written at `place`.
 fn with(bytes: &[u8], place: usize, part: &[u8]) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     bytes[place..place + part.len()].copy_from_slice(part);
@@ -65,7 +65,7 @@ fn the_layout_is_what_is_documented() {
     }
 }
 
-/// One damaged bit anywhere, and every length but the right one.
+/// One flipped bit anywhere, and every wrong length.
 #[test]
 fn damaged_bytes_are_refused() {
     for configuration in [FILTER, PLANT] {
@@ -128,7 +128,7 @@ fn the_message_says_what_is_wrong() {
         assert!(state.is_null() && message.ends_with(&wanted), "{message} should end with {wanted}");
     }
     assert_eq!(slave.now(), bytes);
-    // Room that an importer has to spare.
+    // A larger buffer than needed.
     let state = slave.state();
     let mut room = vec![1_u8; size + 3];
     slave.ok((API.serialize)(slave.component, state, room.as_mut_ptr().cast(), size + 3));
@@ -199,7 +199,8 @@ fn states_that_are_none() {
     assert_eq!(slave.now(), before);
 }
 
-/// A state works in every instance of its FMU, in none of another, and ends with the one that made it.
+/// A state works in every instance of its FMU, in none of another FMU, and ends with the instance that made
+/// it.
 #[test]
 fn states_and_other_instances() {
     let (filter, plant) = (Fmu::new(FILTER), Fmu::new(PLANT));

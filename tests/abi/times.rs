@@ -1,4 +1,4 @@
-//! Communication points and steps as importers really pass them.
+//! Communication points and steps as importers actually pass them.
 
 use punctual_core::filter::Filter;
 
@@ -14,8 +14,8 @@ fn sample(filter: &mut Filter, t: f64, x: &[f64; 6]) -> [f64; 2] {
 
 const INPUTS: [f64; 6] = [1.0, 2.0, 3.0, 4.0, 0.5, -0.5];
 
-/// Steps and points seen in importers: jitter, tiny steps, none, and points that were counted otherwise
-/// than by adding steps. A point within round-off of the end of the last step is that end.
+/// Steps and points seen in importers: jitter, tiny steps, zero steps, and points that are not sums of steps.
+/// A point within round-off of the end of the last step is that end.
 #[test]
 fn odd_steps() {
     let fmu = Fmu::new(FILTER);
@@ -32,7 +32,7 @@ fn odd_steps() {
         (0.45, 0.0),
         (0.45, f64::MIN_POSITIVE),
         (0.449999999999999, 0.55),
-        // A gap: the importer knows what it does.
+        // A gap, which is the importer's choice.
         (5.0, 1e-3),
         (5.001000001, 1e-3),
         (5.002000001, 100.0),
@@ -48,7 +48,7 @@ fn odd_steps() {
     }
 }
 
-/// Three ways to count the same points: none is refused, and the promise is the same to round-off.
+/// Three ways to compute the same points: none is refused, and the promise is the same up to round-off.
 #[test]
 fn time_added_multiplied_and_in_nanoseconds() {
     let fmu = Fmu::new(FILTER);
@@ -104,7 +104,7 @@ fn backwards_without_a_restored_state() {
     }
 }
 
-/// A point that is early by round-off does not turn time back, however often it comes.
+/// A point that is early by round-off does not move time backwards, however often it occurs.
 #[test]
 fn time_does_not_creep_backwards() {
     let fmu = Fmu::new(FILTER);
@@ -154,14 +154,14 @@ fn times_and_steps_that_are_none() {
     }
 }
 
-/// An importer that ignores the error of one step goes on at the next communication point: a plant would
-/// have lost a part of its motion, a filter has not.
+/// An importer that ignores the error of one step continues at the next communication point. A plant would
+/// have lost part of its motion, a filter has not.
 #[test]
 fn a_gap_is_refused_by_a_plant_and_taken_by_a_filter() {
     for (configuration, gaps) in [(FILTER, true), (PLANT, false)] {
         let fmu = Fmu::new(configuration);
         let slave = Slave::ready(&fmu);
-        // The first step may be anywhere: not every importer tells the start time.
+        // The first step may be anywhere, since not every importer passes the start time.
         slave.step(3.0, 0.1);
         slave.refused(slave.try_step(3.1, f64::NAN));
         if gaps {
@@ -171,7 +171,7 @@ fn a_gap_is_refused_by_a_plant_and_taken_by_a_filter() {
         let message = slave.refused(slave.try_step(3.2, 0.1));
         let wanted = "currentCommunicationPoint is 3.2, must be the present one, 3.1: the plant did not move";
         assert!(message.contains(wanted), "{message}");
-        // Round-off and the resolution of an importer's clock are no gap.
+        // Round-off and the resolution of an importer's clock are not a gap.
         slave.step(3.1 + 1e-8, 0.1);
     }
 }
@@ -206,7 +206,7 @@ fn any_start_time() {
         slave.set_inputs(&INPUTS);
         for (t, h) in [(begin, 0.5), (begin + 0.5, 0.25)] {
             slave.step(t, h);
-            // 1e-9 s counts as 0, where the instance starts by itself.
+            // 1e-9 s counts as 0, where the instance starts by default.
             let u = sample(&mut filter, if t == 1e-9 { 0.0 } else { t }, &INPUTS);
             slave.shows(&filter, &u, &format!("after the step from {t}, started at {begin}"));
         }

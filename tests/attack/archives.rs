@@ -1,5 +1,5 @@
-//! Archives, model descriptions and library files with edits, given to `validate` and to what opens an FMU
-//! for `run`. Nothing of them is executed.
+//! Edited archives, model descriptions and library files, given to `validate` and to what opens an FMU for
+//! `run`. None of their code is executed.
 
 use std::io::{Cursor, Write};
 
@@ -74,7 +74,7 @@ const NAMES: &[&str] = &[
 fn pack(entries: &[(&str, &[u8])], method: CompressionMethod) -> Vec<u8> {
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
     for (name, bytes) in entries {
-        // A name that is there twice is left out here: it is made by edits of the finished archive.
+        // Duplicate names are left out here, since edits of the finished archive produce them.
         if zip.start_file(*name, SimpleFileOptions::default().compression_method(method)).is_ok() {
             zip.write_all(bytes).expect("memory");
         }
@@ -104,7 +104,7 @@ fn archives_with_edits() {
         entries.extend(extra.map(|name| (name, &b"extra"[..])));
         let mut archive = pack(&entries, method);
         if kind > 5 {
-            // Most of an archive is content; what matters is at its end and at the heads of entries.
+            // Most of an archive is content; the relevant parts are its end and the headers of entries.
             let at = archive.len() - 300 - bytes.below(200);
             let tail = archive.split_off(at);
             archive.extend(bytes.edited(&tail, WORDS));
@@ -117,7 +117,7 @@ fn archives_with_edits() {
         let report = match validate(&path, None) {
             Ok(report) => report,
             Err(refusal) => {
-                // Another version is out of scope, and nothing is said of what else there is.
+                // Another version is out of scope, and nothing else is reported.
                 assert!(refusal.to_string().contains("x.fmu: it is of FMI "), "{refusal}");
                 return 0;
             }

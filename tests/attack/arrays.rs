@@ -1,7 +1,8 @@
 //! The functions of FMI 3.0 in any order with any arguments, on one instance.
 //!
-//! What `calls` asks of FMI 2.0 in depth is the same code here. So this looks at what every call must keep: a known
-//! status, one message for a failure and none for a success, the table of legal modes, nothing changed by a failure.
+//! The code shared with FMI 2.0 is tested in depth by `calls`. So this checks what every call must satisfy: a
+//! known status, one message for a failure and none for a success, the table of legal modes, nothing changed
+//! by a failure.
 
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_int, c_void};
@@ -27,7 +28,7 @@ pub(crate) static FLEET: LazyLock<Vec<Fmu>> = LazyLock::new(|| {
 /// Longest step in s, so that a case takes no time.
 const LONGEST: f64 = 2.0;
 
-/// Messages of failed calls since the last look, and the last of all.
+/// Messages of failed calls since the last check, and the last message.
 #[derive(Default)]
 struct Log {
     failures: usize,
@@ -69,7 +70,7 @@ impl Drop for Slave {
 }
 
 impl Slave {
-    /// An instance of the FMU that `bytes` say, all messages wanted.
+    /// An instance of the FMU that `bytes` select, with all messages enabled.
     fn new(bytes: &mut Bytes) -> Self {
         let fmu = &FLEET[bytes.below(FLEET.len())];
         let log_box = Box::<RefCell<Log>>::default();
@@ -83,7 +84,7 @@ impl Slave {
         Self { fmu, instance, mode, log: log_box, states, calls: 0, digest: 0 }
     }
 
-    /// Judges an answer; whether the call did as asked.
+    /// Judges an answer; returns whether the call succeeded.
     fn answered(&mut self, name: &str, call: Option<Call>, status: c_int) -> bool {
         assert!(matches!(status, OK | ERROR | DISCARD), "{name} answers {status}");
         let failures = std::mem::take(&mut self.log.borrow_mut().failures);
@@ -108,7 +109,7 @@ impl Slave {
         bytes
     }
 
-    /// Makes a call that changes the mode where it is done.
+    /// Makes a call that changes the mode if it succeeds.
     fn moved(&mut self, name: &str, call: Call, to: Mode, status: c_int) {
         if self.answered(name, Some(call), status) {
             self.mode = to;
@@ -171,7 +172,7 @@ fn call(slave: &mut Slave, bytes: &mut Bytes) {
         29 => {
             let names = [c"logEvents".as_ptr(), c"logStatusWarning".as_ptr(), c"none%n".as_ptr(), null()];
             let chosen: Vec<_> = (0..bytes.below(3)).map(|_| bytes.pick(&names)).collect();
-            // Warnings stay on, so that every discarded call has its message.
+            // Warnings stay enabled, so that every discarded call has its message.
             let on = u8::from(chosen.is_empty() || chosen.iter().any(|name| *name == names[1]));
             let status = (API.set_debug_logging)(c, on, chosen.len(), chosen.as_ptr());
             slave.answered("set_debug_logging", None, status);
@@ -299,7 +300,7 @@ fn state(slave: &mut Slave, bytes: &mut Bytes) {
     }
 }
 
-/// Calls of model exchange, which there is not, with whatever arguments.
+/// Calls of model exchange, which is not supported, with arbitrary arguments.
 fn exchange(slave: &mut Slave, bytes: &mut Bytes) {
     let (c, n) = (slave.instance, bytes.below(5));
     let mut x: Vec<f64> = (0..n).map(|_| bytes.number()).collect();
@@ -339,7 +340,7 @@ fn dependencies(slave: &mut Slave, bytes: &mut Bytes) {
     }
 }
 
-/// Functions of what there is not.
+/// Functions of unsupported features.
 fn absent(slave: &mut Slave, bytes: &mut Bytes) {
     let (c, reference, n) = (slave.instance, 0, bytes.below(2));
     let (r, mut long, mut text, mut binary) = (&raw const reference, 5, null(), null());

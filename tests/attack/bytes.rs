@@ -1,6 +1,6 @@
-//! Readings of a case: numbers, choices, edits of texts.
+//! Interprets the bytes of a case: as numbers, choices, edits of texts.
 
-/// The bytes that are still to be read; zeros after the end.
+/// The bytes still to be read; zeros after the end.
 pub(crate) struct Bytes<'a> {
     rest: &'a [u8],
 }
@@ -41,7 +41,7 @@ impl<'a> Bytes<'a> {
         f64::from(i16::from_le_bytes([self.byte(), self.byte()])) / 256.0
     }
 
-    /// Any number at all.
+    /// Any number.
     pub(crate) fn number(&mut self) -> f64 {
         const ODD: [f64; 12] = [
             0.0,

@@ -12,7 +12,7 @@ use crate::campaign;
 use crate::fleet::FLEET;
 use crate::machine::{Machine, Pool};
 
-/// Number of cases after which one is run again with new instances.
+/// Number of cases after which one is repeated with new instances.
 const AGAIN: usize = 16;
 
 #[test]
@@ -28,7 +28,7 @@ fn sequences_of_calls() {
     });
 }
 
-/// Runs the sequence that `bytes` say; a digest of all values read, and the number of calls.
+/// Runs the sequence that `bytes` encode; returns a digest of all values read, and the number of calls.
 fn sequence(pool: &mut Pool, bytes: &[u8], new: bool) -> (u64, usize) {
     let mut bytes = Bytes::new(bytes);
     let slots = (0..1 + bytes.below(3)).map(|_| pool.slot(&mut bytes, new)).collect();
@@ -49,7 +49,7 @@ fn sequence(pool: &mut Pool, bytes: &[u8], new: bool) -> (u64, usize) {
     }
     let result = (machine.digest, machine.calls);
     if new {
-        // Freed in whatever mode they are, their states with them.
+        // Freed in whatever mode they are, together with their states.
         drop(machine);
     } else {
         pool.give_back(machine);
@@ -105,7 +105,7 @@ fn call(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
     }
 }
 
-/// Uses a state that is, or was, there, or a number that never was one.
+/// Uses a state that exists, or existed, or a number that never was one.
 fn state(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
     let c = machine.slots[k].instance.component;
     let place = bytes.below(machine.held.len());
@@ -145,7 +145,8 @@ fn state(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
     }
 }
 
-/// Reads or writes a few variables, known and unknown, arrays there or NULL. A failed call changes nothing.
+/// Reads or writes a few variables, known and unknown, with valid arrays or NULL. A failed call changes
+/// nothing.
 fn values(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
     let instance = &machine.slots[k].instance;
     let (c, variables) = (instance.component, instance.fmu.product.variables.len());
@@ -161,7 +162,7 @@ fn values(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
     let odd = bytes.byte() % 16;
     let refs = if odd == 0 { null() } else { references.as_ptr() };
     let length = if odd == 1 { usize::MAX - 7 } else { count };
-    // NULL is passed only where the array is not read anyhow.
+    // NULL is passed only if the array is not read anyway.
     let (real, int, text) = if odd == 2 {
         (null_mut(), null_mut(), null_mut())
     } else {
@@ -210,10 +211,10 @@ fn logging(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
     assert_eq!(machine.answered(k, "set_debug_logging", None, status), usable);
 }
 
-/// Asks for derivatives of some outputs by some inputs, or of variables that have none. The state stays as it is,
-/// and so do the numbers of a call that fails.
+/// Requests derivatives of some outputs with respect to some inputs, or of variables without any. The state
+/// is unchanged, and so are the numbers of a failed call.
 fn derivatives(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
-    // Outputs are computed when they are read; from then on they are known.
+    // Outputs are computed when they are read; then they are known.
     machine.look(k);
     let instance = &machine.slots[k].instance;
     let some = |causality, bytes: &mut Bytes| -> Vec<_> {
@@ -268,7 +269,7 @@ fn absent(machine: &mut Machine, k: usize, bytes: &mut Bytes) {
     assert_eq!(machine.answered(k, "what there is not", None, status), usable);
 }
 
-/// Arguments of `fmi2Instantiate` that are refused, without anybody to tell.
+/// Arguments of `fmi2Instantiate` that are refused, without a logger.
 fn refused_instance(bytes: &mut Bytes) {
     let fmu = &FLEET[bytes.below(FLEET.len())];
     let (good, place) = (CString::new(fmu.guid()).unwrap(), CString::new(fmu.location()).unwrap());

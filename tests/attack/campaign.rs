@@ -7,13 +7,13 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Longest time of a case, on a loaded machine.
+/// The longest time of a case on a loaded machine.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The most bytes of a generated case.
 const LONGEST: usize = 256;
 
-/// The splitmix64 generator: the bytes of a case depend on its number only.
+/// The splitmix64 generator: the bytes of a case depend only on its number.
 fn generated(case: usize) -> Vec<u8> {
     let mut state = case as u64;
     let mut next = || {
@@ -27,7 +27,7 @@ fn generated(case: usize) -> Vec<u8> {
     (0..length.div_ceil(8)).flat_map(|_| next().to_le_bytes()).take(length).collect()
 }
 
-/// The cases of `corpus/NAME.txt`: one of hexadecimal digits in each line, with a remark after `#`.
+/// The cases of `corpus/NAME.txt`: hexadecimal digits, one case per line, with a remark after `#`.
 fn corpus(name: &str) -> Vec<Vec<u8>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/attack/corpus").join(format!("{name}.txt"));
     let text = fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
@@ -48,9 +48,9 @@ fn hex(bytes: &[u8]) -> String {
     })
 }
 
-/// Gives every case of the corpus and `usual` generated ones (times `PUNCTUAL_ATTACK`) to `attack`. Prints their
-/// number, and the sum of the numbers that `attack` counts as `counted`. A case that fails is printed as a line
-/// for the corpus. A case that ends the process is in a file beside the tests.
+/// Passes every case of the corpus and `usual` generated ones (times `PUNCTUAL_ATTACK`) to `attack`. Prints
+/// their number, and the sum of the numbers that `attack` returns, as `counted`. A case that fails is printed
+/// as a line for the corpus. A case that ends the process is left in a file beside the tests.
 pub(crate) fn run(name: &str, usual: usize, counted: &str, mut attack: impl FnMut(&[u8]) -> usize) {
     let factor =
         std::env::var("PUNCTUAL_ATTACK").map_or(1, |n| n.parse().expect("PUNCTUAL_ATTACK: a number"));

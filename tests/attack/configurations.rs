@@ -1,4 +1,4 @@
-//! Configurations and system files with edits.
+//! Edited configurations and system files.
 
 use std::time::{Duration, Instant};
 
@@ -83,13 +83,13 @@ const WORDS: &[&str] = &[
     "\\u0000",
 ];
 
-/// Longest time of an unreasonable file, on a loaded machine.
+/// The longest time for an unreasonable file on a loaded machine.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// The most bytes of an error, which may quote a line of the file, cut off.
+/// The most bytes of an error, which may quote a truncated line of the file.
 const LONGEST_ERROR: usize = 4000;
 
-/// A configuration is refused by name, or gives an FMU whose inputs and states are finite.
+/// A configuration is refused with a field, or gives an FMU whose inputs and states are finite.
 #[test]
 fn configurations_with_edits() {
     campaign::run("configurations", 3000, "accepted", |bytes| {
@@ -110,7 +110,7 @@ fn configurations_with_edits() {
     });
 }
 
-/// An error says where and what, on lines that can be read.
+/// An error says where and what, in readable lines.
 fn named(message: &str) {
     let line = ["TOML parse error at line ", "at line "].iter().any(|head| message.starts_with(head));
     let placed = message.contains(": ") || line;
@@ -179,7 +179,7 @@ fn system_files_with_edits() {
     });
 }
 
-/// Nesting, lengths and counts that no person writes: refused or read, soon and without a crash.
+/// Nesting, lengths and counts that no person writes: refused or read, quickly and without a crash.
 #[test]
 fn deep_long_and_many() {
     let head = "kind = \"filter\"\nplant.model = \"point_mass\"\n";
@@ -200,7 +200,7 @@ fn deep_long_and_many() {
         assert!(begin.elapsed() < PATIENCE, "{:?}: {error:.500}", begin.elapsed());
         assert!(error.contains(wanted) && error.len() < LONGEST_ERROR, "{} bytes: {error:.500}", error.len());
     }
-    // Points have no greatest number: each is two parameters, and they are read in bounded time.
+    // The number of points is not limited: each is two parameters, and they are read in bounded time.
     let (count, begin) = (20_000, Instant::now());
     let points = "[1.0, 2.0],".repeat(count);
     let head = "kind = \"controller\"\ncontroller = \"waypoints\"\nplant.model = \"unicycle\"\n";

@@ -1,10 +1,10 @@
-//! FMUs of every kind: filters, plants and controllers, of few variables and many.
+//! FMUs of every kind: filters, plants and controllers, with few variables and many.
 
 use std::sync::LazyLock;
 
 use crate::fmu::{FILTER, Fmu, PLANT};
 
-/// The configurations; also what `configurations` starts from.
+/// The configurations, which `configurations` also starts from.
 pub(crate) const CONFIGURATIONS: [&str; 11] = [
     FILTER,
     PLANT,
@@ -19,7 +19,7 @@ pub(crate) const CONFIGURATIONS: [&str; 11] = [
     HEADING,
 ];
 
-/// Goals one after the other, an obstacle, a soft limit; outputs by steps only.
+/// A sequence of goals, an obstacle, a soft limit; outputs change only in steps.
 const SEQUENCE: &str = r#"
 kind = "filter"
 direct_feedthrough = false
@@ -75,6 +75,6 @@ const DAMPING: &str =
 const HEADING: &str = "kind = \"controller\"\ncontroller = \"heading\"\ngoal = [1.0, 2.0]\n\
                        goal_input = true\nplant.model = \"point_mass\"\n";
 
-/// Those that can be instantiated, extracted once.
+/// The FMUs that can be instantiated, extracted once.
 pub(crate) static FLEET: LazyLock<Vec<Fmu>> =
     LazyLock::new(|| CONFIGURATIONS.iter().map(|text| Fmu::new(text)).collect());

@@ -1,7 +1,8 @@
-//! Sessions of two C programs, `tests/fixtures/host.c` for FMI 2.0 and `host3.c` for 3.0, with every FMU of the fleet: once under
-//! AddressSanitizer and UBSan, once under valgrind. An access to what is not there, or memory that is still
-//! there after `fmi2FreeInstance` and `dlclose`, is an error. `PUNCTUAL_ATTACK_LIBRARY` names another build
-//! of the shared library, such as one that is itself instrumented, which valgrind does not take (`tests/nightly`).
+//! Runs two C programs, `tests/fixtures/host.c` for FMI 2.0 and `host3.c` for 3.0, with every FMU of the
+//! fleet: once under AddressSanitizer and UBSan, once under valgrind. An invalid memory access is an error,
+//! and so is memory that remains after `fmi2FreeInstance` and `dlclose`. `PUNCTUAL_ATTACK_LIBRARY` selects
+//! another build of the shared library, such as an instrumented one, which valgrind does not support
+//! (`tests/nightly`).
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -11,14 +12,14 @@ use crate::arrays;
 use crate::fleet::FLEET;
 use crate::workshop::Workshop;
 
-/// The two hosts: the source, and GUID and resources of each FMU as it wants them.
+/// The two hosts: the source, and GUID and resources of each FMU in the form it expects.
 fn hosts() -> [(&'static str, Vec<String>); 2] {
     let two = FLEET.iter().flat_map(|fmu| [fmu.guid().to_owned(), fmu.location()]).collect();
     let three = arrays::FLEET.iter().flat_map(|fmu| [fmu.guid().to_owned(), fmu.path()]).collect();
     [("host", two), ("host3", three)]
 }
 
-/// Compiles a host; the compiler's answer and the program.
+/// Compiles a host; returns the compiler's output and the program.
 fn compiled(workshop: &Workshop, host: &str, flags: &[&str]) -> (Output, PathBuf) {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/fixtures/{host}.c"));
     let program = workshop.path(host);
@@ -38,7 +39,8 @@ fn library(workshop: &Workshop) -> String {
     library.unwrap_or_else(|_| workshop.path("library").display().to_string())
 }
 
-/// Says on the terminal, past the capture of test output, that something was not tested; in CI that is a failure.
+/// Reports on the terminal, bypassing the capture of test output, that something was not tested; in CI that
+/// is a failure.
 fn skipped(what: &str, why: &str) {
     let text = format!("\nNOT TESTED: the C host under {what}: {why}\n");
     assert!(std::env::var_os("CI").is_none(), "{text}");

@@ -1,4 +1,4 @@
-//! An instance that watches its log.
+//! An instance that checks its log.
 
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_int, c_void};
@@ -11,16 +11,16 @@ use punctual_modeldescription::{BaseType, Causality};
 use crate::api::{API, Component, ERROR, OK, State, Text, callbacks};
 use crate::fmu::Fmu;
 
-/// The status of a message that is a remark. No function returns it.
+/// The status of a message that is a notice. No function returns it.
 const WARNING: c_int = fmi2::Status::WARNING.0;
 
 /// Observations of the logger.
 #[derive(Default)]
 pub(crate) struct Log {
-    /// Messages of failed calls since the last look, and the last of them.
+    /// Messages of failed calls since the last check, and the last of them.
     errors: usize,
     last: String,
-    /// A message that breaks the rules of messages.
+    /// A message that violates the rules for messages.
     wrong: Option<String>,
 }
 
@@ -44,7 +44,7 @@ extern "C" fn log(environment: *mut c_void, name: Text, status: c_int, category:
     log.last = text.to_owned();
 }
 
-/// An instance with its log and the mode that it should be in.
+/// An instance with its log and its expected mode.
 pub(crate) struct Instance {
     pub(crate) fmu: &'static Fmu,
     pub(crate) component: Component,
@@ -69,8 +69,8 @@ impl Instance {
         Self { fmu, component, mode: Mode::INSTANTIATED, log }
     }
 
-    /// Judges the answer of a call: a known status, and a message where it failed and only there. Returns whether
-    /// the call did as asked.
+    /// Judges the answer of a call: a known status, and a message if and only if it failed. Returns whether
+    /// the call succeeded.
     #[track_caller]
     pub(crate) fn answered(&self, call: &str, status: c_int) -> bool {
         let mut log = self.log.borrow_mut();
@@ -88,7 +88,7 @@ impl Instance {
         assert!(done, "{call}: {}", self.log.borrow().last);
     }
 
-    /// The present state as bytes: every bit that the instance remembers.
+    /// The current state as bytes: everything that the instance remembers.
     pub(crate) fn now(&self) -> Vec<u8> {
         let mut state = null_mut();
         self.ok("get_state", (API.get_state)(self.component, &raw mut state));

@@ -13,17 +13,17 @@ use crate::bytes::Bytes;
 use crate::fleet::FLEET;
 use crate::instance::Instance;
 
-/// Most inner steps that a plant is asked for in one step, so that a case takes no time.
+/// The most inner steps requested of a plant in one step, so that a case takes no time.
 const INNER_STEPS: f64 = 1000.0;
 
-/// Size of inputs and parameters whose products overflow. A controller may want no number of them, which a filter
+/// Size of inputs and parameters whose products overflow. A controller may then output NaN, which a filter
 /// shows.
 const HUGE: f64 = 1e150;
 
-/// The parameter of a bound that is none.
+/// The parameter value of a missing bound.
 const NO_BOUND: f64 = 1e30;
 
-/// A state that is, or was, alive.
+/// A state that exists or existed.
 pub(crate) struct Held {
     pub(crate) pointer: State,
     fmu: usize,
@@ -38,14 +38,14 @@ pub(crate) struct Slot {
     pub(crate) instance: Instance,
     /// Its place in the fleet.
     pub(crate) fmu: usize,
-    /// Values came from changed bytes, and no step was made since.
+    /// Whether values came from changed bytes and no step was made since.
     pub(crate) doubtful: bool,
 }
 
 pub(crate) struct Machine {
     pub(crate) slots: Vec<Slot>,
     pub(crate) held: Vec<Held>,
-    /// A digest of all that was read: the same for the same case.
+    /// A digest of everything read, which is the same for the same case.
     pub(crate) digest: u64,
     pub(crate) calls: usize,
 }
@@ -59,7 +59,7 @@ impl Machine {
         self.digest = (self.digest ^ bits).wrapping_mul(0x0100_0000_01B3).rotate_left(17);
     }
 
-    /// Judges a call of slot `k`: its answer, and that it failed where it is illegal in this mode.
+    /// Judges a call of slot `k`: its answer, and that it failed if it is illegal in this mode.
     #[track_caller]
     pub(crate) fn answered(&mut self, k: usize, name: &str, call: Option<Call>, status: c_int) -> bool {
         let done = self.slots[k].instance.answered(name, status);
@@ -70,8 +70,8 @@ impl Machine {
         done
     }
 
-    /// Makes a call that changes the mode. `usable` tells that its arguments are right, so that it must succeed
-    /// where legal.
+    /// Makes a call that changes the mode. `usable` says that its arguments are right, so that it must
+    /// succeed if it is legal.
     #[track_caller]
     pub(crate) fn moved(&mut self, k: usize, call: Call, to: Mode, usable: bool, status: c_int) {
         let legal = self.slots[k].instance.mode.is_in(call.modes());
@@ -82,7 +82,7 @@ impl Machine {
         }
     }
 
-    /// Goes from wherever slot `k` is to step mode, if its parameters allow.
+    /// Moves slot `k` from any mode to step mode, if its parameters allow.
     pub(crate) fn initialize(&mut self, k: usize, start: f64) {
         let c = self.slots[k].instance.component;
         let status = (API.setup_experiment)(c, 0, 0.0, start, 0, 0.0);
@@ -96,7 +96,7 @@ impl Machine {
         }
     }
 
-    /// Sets all real inputs, by `value`.
+    /// Sets all real inputs to numbers from `value`.
     pub(crate) fn set_inputs(&mut self, k: usize, mut value: impl FnMut() -> f64) {
         let slot = &self.slots[k];
         let references = slot.instance.references(Causality::Input, "");
@@ -108,7 +108,7 @@ impl Machine {
         assert_eq!(done, legal, "inputs take any number");
     }
 
-    /// Makes a step; afterwards time has moved, or stands and the refusal shows.
+    /// Makes a step. Afterwards either time has advanced, or it has not and the refusal shows.
     pub(crate) fn step(&mut self, k: usize, t: f64, h: f64) {
         let slot = &self.slots[k];
         let h = match slot.instance.reals(Causality::Parameter, "inner_step")[..] {
@@ -203,7 +203,7 @@ impl Machine {
         }
     }
 
-    /// Sets slot `k` to the state at `place`: one that was read from changed bytes may be refused.
+    /// Restores slot `k` to the state at `place`; one that was read from changed bytes may be refused.
     pub(crate) fn restore(&mut self, k: usize, place: usize) {
         let Held { pointer, fmu, mode, doubtful, live, .. } = self.held[place];
         let before = self.slots[k].instance.now();
@@ -262,7 +262,7 @@ impl Machine {
     }
 }
 
-/// Instances for cases, reset after each, which must make them as new.
+/// Instances for cases. They are reset after each case, which must make them like new.
 #[derive(Default)]
 pub(crate) struct Pool {
     free: Vec<Vec<Instance>>,
@@ -270,7 +270,7 @@ pub(crate) struct Pool {
 }
 
 impl Pool {
-    /// An instance of a kind that `bytes` say, used before or, with `new`, not.
+    /// An instance of a kind that `bytes` select; with `new` it has not been used before.
     pub(crate) fn slot(&mut self, bytes: &mut Bytes, new: bool) -> Slot {
         if self.fresh.is_empty() {
             self.fresh = FLEET.iter().map(|fmu| Instance::new(fmu).now()).collect();

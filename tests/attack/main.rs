@@ -1,8 +1,8 @@
-//! Attacks: calls, states, configurations and archives made of arbitrary bytes, and a host in C under the
+//! Attacks: calls, states, configurations and archives made from arbitrary bytes, and a host in C under the
 //! sanitizers and valgrind.
 //!
-//! A case is a few bytes, from a generator with a fixed seed or from a line of `corpus/`, where every case
-//! that once failed is kept. `PUNCTUAL_ATTACK` multiplies the number of cases (`tests/nightly`).
+//! A case is a few bytes, from a generator with a fixed seed or from a line of `corpus/`, which keeps every
+//! case that ever failed. `PUNCTUAL_ATTACK` multiplies the number of cases (`tests/nightly`).
 //!
 //! | module | attacks |
 //! |---|---|

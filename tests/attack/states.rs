@@ -7,7 +7,7 @@ use crate::bytes::Bytes;
 use crate::campaign;
 use crate::machine::{Machine, Pool};
 
-/// CRC-32 as in Ethernet and zip: the library's own is not looked at.
+/// CRC-32 as in Ethernet and zip, independent of the library's own.
 fn crc32(bytes: &[u8]) -> u32 {
     let mut crc = u32::MAX;
     for byte in bytes {
@@ -19,8 +19,8 @@ fn crc32(bytes: &[u8]) -> u32 {
     !crc
 }
 
-/// Changed bytes are refused by their checksum. With the checksum put right they are refused for their content,
-/// or taken. Then the instance goes on, with inputs and states finite and within bounds.
+/// Changed bytes are refused by their checksum. With a corrected checksum they are refused for their content,
+/// or accepted. Then the instance continues, with inputs and states finite and within bounds.
 #[test]
 fn states_of_changed_bytes() {
     let mut pool = Pool::default();
@@ -50,7 +50,7 @@ fn changed(machine: &mut Machine, bytes: &mut Bytes) -> bool {
     let mut state = original.clone();
     let content = state.len() - 4;
     for _ in 0..1 + bytes.below(5) {
-        // Most changes are behind the header, which is refused for every change.
+        // Most changes are made behind the header, since every change in the header is refused.
         let header = if bytes.below(8) == 0 { 0 } else { 58 };
         let at = header + bytes.position(content - header);
         match bytes.below(4) {

@@ -1,5 +1,5 @@
-//! One file, one command: a new file, checked and run; a filter's file as a system of its own; configurations where
-//! systems take FMUs.
+//! Everything from one file: a new file is checked and run; a filter's file is a system of its own; systems
+//! accept configurations in place of FMUs.
 
 use std::fs;
 
@@ -31,7 +31,7 @@ centre = [5.0, 7.0]
 radius = 2.0
 "#;
 
-/// A wall that is to be kept, and a controller that drives at it, or away from it.
+/// A wall that must be kept, and a controller that drives towards it, or away from it.
 #[test]
 fn a_run_says_how_much_of_u_ref_was_changed() {
     let workshop = Workshop::new();
@@ -39,22 +39,22 @@ fn a_run_says_how_much_of_u_ref_was_changed() {
                 experiment = { stop_time = 3.0, step_size = 0.02 }\n\
                 [plant]\nstates = [{ name = \"x\" }]\ninputs = [{ name = \"u\", min = -2.0, max = 2.0 }]\n\
                 derivatives = { x = \"u\" }\n[[barrier]]\nname = \"wall\"\nexpression = \"1 - x\"\n";
-    let told = |wanted: &str, json: &[&str]| {
+    let printed = |wanted: &str, json: &[&str]| {
         workshop.write("my.toml", file.replace("WANTED", wanted));
         workshop.punctual(["run", "my.toml"].into_iter().chain(json.iter().copied())).success()
     };
-    let away = told("-0.5", &[]);
+    let away = printed("-0.5", &[]);
     assert!(away.contains("\nfilter left u_ref as it is at all 151 samples.\nEvery promise"), "{away}");
-    // Twice as much as it may have, of bounds that are 4 apart: 1 of them is a quarter.
-    let report: Value = serde_json::from_str(&told("1.0", &["--json"])).expect("JSON");
+    // The change is twice the bound. The bounds are 4 apart, so a change of 1 is a quarter.
+    let report: Value = serde_json::from_str(&printed("1.0", &["--json"])).expect("JSON");
     let of = &report["interference"][0];
     let [samples, changed] = ["samples", "changed"].map(|key| of[key].as_u64().expect("a number"));
     let [mean, most] = ["mean", "most"].map(|key| of[key].as_f64().expect("a number"));
-    // It is at the wall after 1 s, and stays there.
+    // It reaches the wall after 1 s, and stays there.
     assert!(samples == 151 && changed > 75 && changed < 140, "{of}");
     assert!(mean > 0.1 && mean <= most && most <= 0.25 + 1e-9, "{of}");
     assert_eq!(of["filter"], "filter");
-    let towards = told("1.0", &[]);
+    let towards = printed("1.0", &[]);
     let shown = format!("\nfilter changed u_ref at {changed} of 151 samples (");
     assert!(towards.contains(&shown) && towards.contains(" % of the bounds in the mean and "), "{towards}");
 }
@@ -89,7 +89,7 @@ fn a_new_file_for_an_fmu_runs_with_one() {
     let workshop = Workshop::new();
     workshop.punctual(["new", "cart.toml", "--model", "fmu"]).success();
     assert_eq!(workshop.files(), ["cart-filter.toml", "cart.toml"]);
-    // The plant of another tool, with the names of the template.
+    // The plant of another tool, with the names used in the template.
     let plant = "kind = \"plant\"\n[plant]\nstates = [{ name = \"position\", unit = \"m\" }, { name = \"speed\", unit = \"m/s\" }]\n\
                  inputs = [{ name = \"force\", unit = \"N\" }]\n[plant.derivatives]\nposition = \"speed\"\n\
                  speed = \"(force - 0.5 * speed) / 4\"\n";
@@ -112,9 +112,9 @@ fn a_report_has_the_verdicts_and_the_numbers_of_the_run() {
         printed["files"].as_array().expect("files").iter().filter_map(Value::as_str).collect();
     assert_eq!(files.last(), Some(&"car/car.html"), "{files:?}");
     let page = workshop.text("car/car.html");
-    // The name of SVG elements is no address that is asked.
+    // The SVG namespace is not an address that is requested.
     assert!(!page.replace("http://www.w3.org/2000/svg", "").contains("http"), "an address");
-    // The verdicts are those that are printed.
+    // The verdicts are the printed ones.
     let tree = body(&page);
     let rows = cells(&tree);
     for promise in printed["promises"].as_array().expect("promises") {
@@ -125,7 +125,7 @@ fn a_report_has_the_verdicts_and_the_numbers_of_the_run() {
     }
     let brake = rows.iter().find(|row| row[0] == "a").expect("the input");
     assert_eq!(brake[4..6], ["-4", "4"]);
-    // Every chart has a place, and every barrier its curve, with the extremes of the recording.
+    // Every chart has a place, and every barrier a curve, with the extremes of the recording.
     let charts = data(&page, "charts");
     let charts = charts.as_array().expect("charts");
     let is_place = |key: &Value| tree.descendants().any(|node| node.attribute("data-chart") == key.as_str());
@@ -137,7 +137,7 @@ fn a_report_has_the_verdicts_and_the_numbers_of_the_run() {
         let drawn =
             h["y"].as_array().expect("values").iter().filter_map(Value::as_f64).fold(f64::INFINITY, f64::min);
         let least = table.column(&format!("filter.{barrier}.h")).into_iter().fold(f64::INFINITY, f64::min);
-        // Seven digits of each value are kept.
+        // Each value keeps seven digits.
         assert!((drawn - least).abs() <= 1e-6 * least.abs(), "{barrier}: {drawn}, not {least}");
     }
     let scene = data(&page, "scene");
@@ -148,7 +148,7 @@ fn a_report_has_the_verdicts_and_the_numbers_of_the_run() {
     assert!(words.contains(&&Value::from("backup")), "{words:?}");
 }
 
-/// Shapes of every kind, one that moves, and names that are no names.
+/// Shapes of every kind, a moving one, and names that need escaping.
 #[test]
 fn a_report_draws_what_has_an_outline_and_escapes_names() {
     let workshop = Workshop::new();
@@ -192,7 +192,7 @@ fn a_report_draws_what_has_an_outline_and_escapes_names() {
         let corner = |c: &Value| [c[0].as_f64().expect("x"), c[1].as_f64().expect("y")];
         outline(name)["rings"][0].as_array().expect("a ring").iter().map(corner).collect()
     };
-    // Seven digits of each coordinate are kept.
+    // Each coordinate keeps seven digits.
     for [x, y] in corners("pond") {
         assert!(((x / 3.0).powi(2) + y.powi(2) - 1.0).abs() < 1e-5, "{x}, {y}");
     }
@@ -207,7 +207,7 @@ fn a_report_draws_what_has_an_outline_and_escapes_names() {
         "{above:?}"
     );
     assert_eq!(scene["outlines"].as_array().map(Vec::len), Some(5), "a speed limit has none");
-    // The picture has those that stay where they are, the obstacles under one word.
+    // The picture shows the barriers that do not move, with one legend entry for all obstacles.
     let picture = workshop.text("out/system-path.svg");
     for (word, is_there) in
         [("hall", true), ("wall", true), ("obstacle", true), ("goal", false), ("pond", false)]
@@ -220,7 +220,7 @@ fn a_report_draws_what_has_an_outline_and_escapes_names() {
     }
 }
 
-/// A point among sets that are expressions, with a number that the system file changes.
+/// A point among sets given by expressions, with a number that the system file changes.
 #[test]
 fn an_expression_of_the_place_has_an_outline() {
     let workshop = Workshop::new();
@@ -256,8 +256,8 @@ fn an_expression_of_the_place_has_an_outline() {
         let corner = |c: &Value| [c[0].as_f64().expect("x"), c[1].as_f64().expect("y")];
         rings[0].as_array().expect("corners").iter().map(corner).collect()
     };
-    // On a straight line between two points h bends by the square of a cell, which is less than 0.1 m. What lies beside the path
-    // is seen as a whole.
+    // Along a straight line between two points, h curves by less than 0.1 m, the square of a cell. A set
+    // beside the path is drawn completely.
     for [x, y] in corners(1) {
         assert!((1.5_f64.powi(2) - (x - 3.0).powi(2) - y.powi(2)).abs() < 0.1_f64.powi(2), "{x}, {y}");
     }
@@ -267,7 +267,8 @@ fn an_expression_of_the_place_has_an_outline() {
             "{x}, {y}"
         );
     }
-    // The wall is endless: all that the square around the path has of it, one edge of which is h = 0.
+    // The wall is unbounded, so the part of it inside the square around the path is drawn, with h = 0 along
+    // one edge.
     let lowest = corners(0).into_iter().map(|[_, y]| y).fold(f64::INFINITY, f64::min);
     assert!((lowest + 3.0).abs() < 1e-5, "{lowest}");
     let picture = workshop.text("out/system-path.svg");
@@ -279,7 +280,7 @@ fn a_file_alone_is_its_filter_and_plant_coupled() {
     let workshop = Workshop::new();
     workshop.write("car.toml", CAR);
     workshop.punctual(["run", "car.toml", "--out", "alone"]).success();
-    // The same by hand: the FMUs, and their configurations.
+    // The same by hand, once with FMUs and once with their configurations.
     let experiment = "[experiment]\nstop_time = 3.0\nstep_size = 0.02\n";
     workshop.write(
         "plant.toml",
@@ -311,12 +312,12 @@ fn a_file_alone_is_its_filter_and_plant_coupled() {
             "{name}: other numbers"
         );
     }
-    // The keys of the run are no part of the FMU.
+    // The keys of the run are not part of the FMU.
     let alone = CAR.lines().filter(|line| !line.starts_with("x0") && !line.starts_with("u_ref"));
     workshop.write("filter.toml", alone.collect::<Vec<_>>().join("\n"));
     workshop.punctual(["build", "filter.toml", "-o", "filter.fmu"]).success();
     assert!(workshop.bytes("filter.fmu") == workshop.bytes("car.fmu"), "another FMU");
-    // An FMU that is not made of the file beside it.
+    // An FMU that was not built from the file beside it.
     workshop.write("plant.toml", workshop.text("plant.toml").replace("v = 1.0", "v = 2.0"));
     let done = workshop.punctual(["run", "fmus.toml"]);
     let stale = "note: plant.fmu was not built from the current plant.toml; rebuild it, or name the .toml file in the system\n";
@@ -393,7 +394,7 @@ fn units_are_the_second_line_where_they_are_asked_for() {
         let with = workshop.text("with/car.csv");
         let (header, rest) = with.split_once('\n').expect("lines");
         let (units, rows) = rest.split_once('\n').expect("lines");
-        // Without that line it is what it is without the option.
+        // Without that line, it is the same as without the option.
         assert_eq!(format!("{header}\n{rows}"), plain);
         let units: Vec<_> = header.split(',').zip(units.split(',')).collect();
         assert_eq!(header.split(',').count(), units.len());
@@ -425,8 +426,7 @@ fn two_vehicles_in_one_model_avoid_each_other() {
     assert!(nearest >= 3.0, "{nearest} m");
 }
 
-/// What is promised of it has an end, which `check` and the run tell, and which is put off.
-/// A set that moves for good has no plan that ends. The key that helps is said.
+/// A set that moves forever has no plan that ends at rest. The message names the key that helps.
 #[test]
 fn a_set_that_moves_asks_for_a_horizon() {
     let workshop = Workshop::new();
@@ -454,6 +454,7 @@ deadline = 12.0
     assert!(!checked.contains("plans: none"), "{checked}");
 }
 
+/// The guarantee ends at some time, which `check` and the run report and which is extended during the run.
 #[test]
 fn an_aeroplane_that_cannot_stop_is_promised_to_loiter() {
     let workshop = Workshop::new();
@@ -473,7 +474,8 @@ fn an_aeroplane_that_cannot_stop_is_promised_to_loiter() {
     let table = Table::parse(&workshop.text("plane/plane.csv"));
     let until = table.column("filter.assured_until");
     assert!(until.is_sorted() && until[0] > 50.0 && until[until.len() - 1] > 65.0, "{until:?}");
-    // Without a horizon it says what to do; where no plans are followed, that there is none to prolong.
+    // Without a horizon, the message says what to do. If no plans are followed, it says that there is none to
+    // extend.
     workshop.write("plane.toml", file.replace("plan_horizon = 20.0", ""));
     let refused = workshop.punctual(["check", "plane.toml"]);
     assert!(refused.code == 1 && refused.stdout.contains("backup plan: NONE was found"), "{refused:#?}");
@@ -521,7 +523,7 @@ fn an_interrupted_run_keeps_its_rows() {
         .stdout(Stdio::piped())
         .spawn()
         .expect("the binary under test");
-    // The folder is made before the first step; the handler is there by then, or soon.
+    // The folder is created before the first step; by then, or soon after, the handler is installed.
     let begin = Instant::now();
     while !workshop.path("out").exists() && begin.elapsed() < Duration::from_secs(60) {
         std::thread::sleep(Duration::from_millis(10));
@@ -529,11 +531,12 @@ fn an_interrupted_run_keeps_its_rows() {
     std::thread::sleep(Duration::from_secs(1));
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill").success());
     assert_eq!(child.wait().expect("a child").code(), Some(130));
-    let mut told = String::new();
-    std::io::Read::read_to_string(&mut child.stderr.take().expect("piped"), &mut told).expect("UTF-8");
+    let mut printed = String::new();
+    std::io::Read::read_to_string(&mut child.stderr.take().expect("piped"), &mut printed).expect("UTF-8");
     assert!(
-        told.starts_with("note: what was recorded until then is in out/car.csv\nerror: interrupted at t = "),
-        "{told}"
+        printed
+            .starts_with("note: what was recorded until then is in out/car.csv\nerror: interrupted at t = "),
+        "{printed}"
     );
     assert!(Table::parse(&workshop.text("out/car.csv")).len() > 1);
 }

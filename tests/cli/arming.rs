@@ -1,4 +1,5 @@
-//! Deadlines that count from zeros which a plant hands out before its first step, and filters that are armed later.
+//! Deadlines that count from zeros that a plant outputs before its first step, and filters that are armed
+//! later.
 
 use serde_json::Value;
 
@@ -6,7 +7,7 @@ use crate::misbehaving::{self, description};
 use crate::table::Table;
 use crate::workshop::Workshop;
 
-/// A filter of a state that another FMU measures; nothing moves that.
+/// A filter whose state another FMU measures; nothing moves the state.
 const FILTER: &str = r#"
 kind = "filter"
 name = "filter"
@@ -25,7 +26,8 @@ deadline = 0.5
 
 fn workshop(defect: &str, order: &str, filter: &str) -> Workshop {
     let workshop = Workshop::new();
-    // Its output depends on no input at once, so that the filter sees what it gives before its first step.
+    // Its output does not depend directly on an input, so the filter sees its value from before the first
+    // step.
     let held = ("dependencies=\"2\" dependenciesKind=\"dependent\"", "dependencies=\"\"");
     misbehaving::write(&workshop, "plant.fmu", description(defect, &[held]), &misbehaving::library(&[]));
     workshop.write("filter.toml", format!("{filter}{FILTER}"));
@@ -46,7 +48,7 @@ fn run(workshop: &Workshop) -> Value {
     serde_json::from_str(&done.stdout).unwrap_or_else(|e| panic!("{e}: {done:#?}"))
 }
 
-/// The notes of a run that speak of zeros.
+/// The notes of a run that mention zeros.
 fn notes(report: &Value) -> Vec<String> {
     let notes = report["notes"].as_array().expect("notes").iter().filter_map(Value::as_str);
     notes.filter(|note| note.contains("all zero")).map(str::to_owned).collect()
@@ -62,7 +64,7 @@ fn zeros_that_a_deadline_counts_from_are_noted() {
     }
 }
 
-/// A state that begins at zero and moves on is none of it, nor are zeros at which the filter was not armed.
+/// A state that begins at zero and moves on does not count, nor do zeros at which the filter was not armed.
 #[test]
 fn other_zeros_are_not() {
     for order in ["gauss-seidel", "jacobi"] {
@@ -72,7 +74,7 @@ fn other_zeros_are_not() {
     }
 }
 
-/// The deadline counts from the armed step, and the steps before are none that failed.
+/// The deadline counts from the armed step, and the steps before do not count as failures.
 #[test]
 fn a_run_is_judged_from_the_armed_step_on() {
     let workshop = workshop("zeros-until-step", "gauss-seidel", "arm_after = 0.1\n");
@@ -83,12 +85,12 @@ fn a_run_is_judged_from_the_armed_step_on() {
     let table = Table::parse(&workshop.text("out/system.csv"));
     assert_eq!(table.column("filter.status")[..2], [9.0, 1.0], "not_armed, then filtered");
     assert_eq!(table.column("filter.u.v")[0], 2.0, "u_ref within its bounds");
-    // Without it, the promise begins outside, and is about a state that never was.
+    // Without it, the promise begins outside, at a state that the plant never had.
     let report = run(&self::workshop("zeros-until-step", "gauss-seidel", ""));
     assert_eq!(report["promises"][0]["began_inside"], false, "{report:#}");
 }
 
-/// One that outlasts the run leaves the promise open.
+/// Arming after the end of the run leaves the promise open.
 #[test]
 fn one_that_is_never_armed_promises_nothing() {
     let workshop = workshop("zeros-until-step", "gauss-seidel", "arm_after = 5.0\n");
@@ -99,7 +101,7 @@ fn one_that_is_never_armed_promises_nothing() {
     assert!(table.column("filter.goal.guaranteed").iter().all(|flag| *flag == 0.0));
 }
 
-/// The Integer twins of enumerations are recorded where they are named, and have the same numbers.
+/// The Integer twins of enumerations are recorded if they are named, and have the same numbers.
 #[test]
 fn twins_are_recorded_where_they_are_named() {
     let workshop = workshop("none", "gauss-seidel", "");

@@ -1,4 +1,5 @@
-//! `assurance = "on"` from a file: what it needs, what `check` and `run` tell of it, and its columns in a campaign.
+//! `assurance = "on"` in a file: its requirements, how `check` and `run` report it, and its columns in a
+//! campaign.
 
 use punctual_cosim::campaign::Cell;
 use serde_json::Value;
@@ -42,7 +43,7 @@ fn workshop(assurance: &str, deadline: f64) -> Workshop {
     workshop
 }
 
-/// A u_ref that drives at the obstacle and past the goal: with plans the promise is kept, and every tool says so.
+/// u_ref drives at the obstacle and past the goal. With plans the promise is kept, and every tool reports so.
 #[test]
 fn a_promise_is_kept_whatever_is_wanted() {
     let workshop = workshop("on", 8.0);
@@ -67,7 +68,7 @@ fn a_promise_is_kept_whatever_is_wanted() {
         run["promises"].as_array().is_some_and(|all| all.iter().all(|p| p["promise"] == "kept")),
         "{run}"
     );
-    // The same without plans is not.
+    // Without plans the promise is not kept.
     let without = self::workshop("off", 8.0);
     let run = without.punctual(["run", "system.toml", "--out", "out", "--require", "kept"]);
     assert_eq!(run.code, 1, "{run:#?}");
@@ -85,11 +86,14 @@ fn what_cannot_be_promised_is_refused() {
     );
     assert!(done.stdout.contains("earliest deadline with a plan: goal 3."), "{}", done.stdout);
     let run = workshop.punctual(["run", "system.toml", "--out", "out"]);
-    let told = format!("{}{}", run.stdout, run.stderr);
-    assert!(told.contains("the guarantee is refused") && told.contains("goal is not met at 2.5"), "{told}");
+    let printed = format!("{}{}", run.stdout, run.stderr);
+    assert!(
+        printed.contains("the guarantee is refused") && printed.contains("goal is not met at 2.5"),
+        "{printed}"
+    );
 }
 
-/// What no plan accounts for is an error that names it.
+/// Anything that plans do not support is an error that names it.
 #[test]
 fn what_no_plan_accounts_for_is_an_error() {
     let workshop = Workshop::new();
@@ -113,7 +117,7 @@ fn what_no_plan_accounts_for_is_an_error() {
     );
 }
 
-/// Left to itself, a filter follows plans where every input has bounds and plans account for everything.
+/// By default a filter follows plans if every input has bounds and plans support everything in the file.
 #[test]
 fn plans_are_followed_where_that_is_possible() {
     let workshop = Workshop::new();
@@ -139,7 +143,7 @@ fn plans_are_followed_where_that_is_possible() {
     );
 }
 
-/// A campaign tells how the promise stood, and each of its rows is `punctual run`'s.
+/// A campaign counts how the guarantee held, and each of its rows equals `punctual run`'s.
 #[test]
 fn a_campaign_counts_where_promises_stood() {
     let workshop = Workshop::new();
@@ -169,7 +173,8 @@ fn a_campaign_counts_where_promises_stood() {
     }
 }
 
-/// Pictures of the plan, and of the starts that can be promised: those near the goal, not those far from it.
+/// Pictures of the plan, and of the starts that can be promised: those near the goal, but not those far from
+/// it.
 #[test]
 fn starts_that_can_be_promised_are_drawn() {
     let workshop = Workshop::new();
@@ -189,7 +194,8 @@ fn starts_that_can_be_promised_are_drawn() {
     assert_eq!((rows.len(), &rows[0][..]), (17, &["x_p", "y_p", "found"][..]));
     for row in &rows[1..] {
         let x: f64 = row[0].parse().expect("a number");
-        // From 50 m away no acceleration of 4 m/s2 is there and stops in 4 s; the nearest start is 12 m from the goal.
+        // From 50 m away, no acceleration of 4 m/s2 arrives and stops within 4 s; the nearest start is 12 m
+        // from the goal.
         let wanted = if x < 0.0 { "no plan keeps goal" } else { "can be promised" };
         assert_eq!(row[2], wanted, "{row:?}");
     }
@@ -203,7 +209,7 @@ fn starts_that_can_be_promised_are_drawn() {
     }
 }
 
-/// What a file declares, and what the warning has to name of it: the keys that no plan accounts for.
+/// The content of a file, and the keys that the warning must name because plans do not support them.
 const DECLARED: [(&str, &str, &[&str]); 9] = [
     ("actuation_delay = 0.05", "", &["actuation_delay is 0.05, "]),
     ("measurement_errors = { v = 0.1, x_p = 0.0 }", "", &["measurement_errors.v is 0.1, "]),
@@ -225,13 +231,13 @@ const DECLARED: [(&str, &str, &[&str]); 9] = [
 ];
 
 fn declared(assurance: &str, top: &str, barrier: &str) -> String {
-    // What is to be reached moves for ever; what is to be kept away from is left behind.
+    // The barrier to be reached moves forever; the one to avoid is left behind.
     let name = if barrier.starts_with("velocity") { "name = \"goal\"" } else { "name = \"tree\"" };
     filter(assurance, 8.0, top).replace(name, &format!("{name}\n{barrier}"))
 }
 
-/// What switches plans off though every input has bounds is named where the file is read, once; `on` makes it an error,
-/// `off` accepts it.
+/// Whatever disables plans although every input has bounds is named once when the file is read. With `on` it
+/// is an error, and `off` accepts it.
 #[test]
 fn what_switches_plans_off_is_said() {
     let workshop = Workshop::with_library();
@@ -256,7 +262,7 @@ fn what_switches_plans_off_is_said() {
             assert!(named.iter().all(|key| warning.contains(key)), "{case}: {warning}");
             assert_eq!(done.stderr.matches("plans are off").count(), 1, "{case}: {}", done.stderr);
         }
-        // An FMU says it in its log, and a run of it hands that on.
+        // An FMU logs it, and a run with the FMU reports it.
         let moved = ["centre[1]", "centre[2]", "velocity[1]", "velocity[2]"]
             .map(|of| format!(", \"tree.{of}\" = 9.0"));
         let inputs = if barrier == "centre_input = true" { moved.concat() } else { String::new() };
@@ -277,7 +283,7 @@ fn what_switches_plans_off_is_said() {
         let meant = workshop.punctual(["run", "filter.toml", "--require", "nothing"]);
         assert!(meant.code == 0 && !meant.stderr.contains("warning: "), "{meant:#?}");
     }
-    // Rows alone are the ordinary case where an input has no bounds, and plans where nothing is in their way.
+    // No warning is needed if an input has no bounds, or if nothing prevents plans.
     for (from, to) in [(", omega = [-2.0, 2.0]", ""), ("", "")] {
         workshop.write("filter.toml", filter("auto", 8.0, "").replace(from, to));
         let done = workshop.punctual(["run", "filter.toml", "--require", "nothing"]);
@@ -285,7 +291,8 @@ fn what_switches_plans_off_is_said() {
     }
 }
 
-/// A broken promise is exit code 1 whether a plan guaranteed it or was refused; one that was refused and kept is a note.
+/// A broken promise gives exit code 1 whether a plan guaranteed it or it was refused. One that was refused
+/// but kept is a note.
 #[test]
 fn the_exit_code_tells_of_broken_promises() {
     let code = |workshop: &Workshop, start: &str, require: &str| {
@@ -308,7 +315,7 @@ fn the_exit_code_tells_of_broken_promises() {
     // Without plans nothing is guaranteed.
     let without = codes(&workshop("off", 8.0), wanted);
     assert_eq!((without[1], without[5]), (0, 1), "{without:?}");
-    // Refused, since it never rests, and met all the same.
+    // Refused, since it never comes to rest, but kept anyway.
     let lucky = Workshop::new();
     lucky.write(
         "drift.toml",

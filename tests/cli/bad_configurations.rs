@@ -1,6 +1,6 @@
-//! `punctual build` on configurations that cannot be used. The message names file, field, value and the values
-//! allowed; the code is 2; nothing is written. (Every defect of every field is tested where configurations are
-//! read; here each way into the command line.)
+//! `punctual build` with configurations that cannot be used. The message names file, field, value and the
+//! allowed values; the exit code is 2; nothing is written. (Every defect of every field is tested where
+//! configurations are read; here each way to get there from the command line.)
 
 use std::fs;
 
@@ -96,7 +96,7 @@ fn a_folder_that_is_missing() {
     done.fails_like(2, "cannot write no/such/my.fmu: ", &[]);
 }
 
-/// A file where the folder should be: refused also to those who may write everywhere.
+/// A file in place of the folder, which is refused even to users who may write everywhere.
 #[test]
 fn a_demonstration_into_a_folder_that_cannot_be_made() {
     let workshop = Workshop::with_library();

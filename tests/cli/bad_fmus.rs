@@ -1,4 +1,5 @@
-//! FMUs that cannot be used: the message names the file and its defect; the code is 1, since the usage was right.
+//! FMUs that cannot be used: the message names the file and its defect; the exit code is 1, since the usage
+//! was right.
 
 use punctual_cosim::host::PLATFORM;
 
@@ -82,7 +83,7 @@ fn no_library_for_this_platform() {
 fn a_library_that_is_none() {
     let done =
         run(|entry, bytes| Some(if entry.starts_with("binaries/") { b"text".to_vec() } else { bytes }));
-    // The loader's own words follow.
+    // The loader's own message follows.
     done.fails_like(1, "plant (plant.fmu): its library cannot be loaded: ", &["unicycle"]);
 }
 

@@ -1,5 +1,5 @@
-//! `punctual run` on system files that cannot be used: the message names file, field, value and the values
-//! allowed; the code is 2.
+//! `punctual run` with system files that cannot be used: the message names file, field, value and the allowed
+//! values; the exit code is 2.
 
 use crate::running::system;
 use crate::workshop::{Done, Workshop};
@@ -17,7 +17,7 @@ fn an_unknown_key() {
     done.fails(2, "system.toml: experiment.stop: is not a key here (did you mean stop_time?) (line 7)");
 }
 
-/// Whatever is wrong with a picture, the key is named, with what is allowed.
+/// Whatever is wrong with a picture, the message names the key and what is allowed.
 #[test]
 fn a_picture_with_a_wrong_value() {
     let cases = [
@@ -94,7 +94,7 @@ fn a_start_value_that_is_not_a_number() {
         .fails(2, "system.toml: component[1].start.\"x0.v\": is NaN; must be finite");
 }
 
-/// The header that is meant has the keys of the tables around it, and no positions.
+/// The suggested header has the keys of the enclosing tables, without indices.
 #[test]
 fn start_values_as_a_list_of_tables() {
     run("fmu = \"filter.fmu\"", "fmu = \"filter.fmu\"\nstart = [{ \"goal.deadline\" = 9.0 }]").fails(
@@ -158,7 +158,7 @@ fn a_file_that_is_missing() {
     Workshop::new().punctual(["run", "my.toml"]).fails_like(2, "cannot read my.toml: ", &[]);
 }
 
-/// The input of the plant overflows at once; the FMU names the place.
+/// The input of the plant overflows immediately; the FMU names the time.
 const OVERFLOW: (&str, &str) = (
     "factor = -1.0",
     "factor = -1.0\n[[connection]]\nfrom = \"filter.u.a\"\nto = \"plant.u.a\"\nfactor = 1e308",
@@ -173,14 +173,14 @@ fn a_run_that_fails_on_the_way() {
         "fmi2DoStep of plant (plant.fmu) at t = 0 s returned fmi2Error\n  [fmi2Error, logStatusError] fmi2DoStep: \
          u.a is inf, must be finite for a step from t = 0",
     );
-    // The recorded rows are not lost: the head and the row of t = 0.
+    // The recorded rows are kept: the header and the row of t = 0.
     let done = workshop.punctual(["run", "system.toml", "--out", "out"]);
     assert_eq!(done.code, 1);
     assert!(done.stderr.contains("note: what was recorded until then is in out/system.csv"), "{done:?}");
     assert_eq!(workshop.text("out/system.csv").lines().count(), 2);
 }
 
-/// The failure is told before the run, which may be long.
+/// The failure is reported before the run, which may be long.
 #[test]
 fn an_output_folder_that_is_a_file() {
     let workshop = Workshop::with_fmus();

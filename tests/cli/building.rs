@@ -1,4 +1,4 @@
-//! `punctual build`: its output, its files, and that it writes the same again.
+//! `punctual build`: its output, its files, and that it is reproducible.
 
 use std::fs;
 
@@ -28,7 +28,7 @@ fn every_example_configuration_is_built() {
     }
 }
 
-/// Beside the binary of `cargo build`, or in `deps/` beside it where only `cargo test` has run.
+/// Beside the binary of `cargo build`, or in its `deps/` if only `cargo test` has run.
 #[test]
 fn the_library_beside_the_program_is_found() {
     let workshop = Workshop::new();
@@ -53,12 +53,12 @@ fn both_versions_of_fmi() {
         "x.fmu: {says} 42 variables, guid {{GUID}}\nx-fmi3.fmu: {says} 43 variables, guid {{GUID}}\n"
     );
     assert_eq!(without_guids(&said), wanted);
-    // The one of 2.0 is what it is without a choice.
+    // The one of 2.0 is the same as without the option.
     workshop.punctual(["build", "filter.toml", "-o", "y.fmu"]).success();
     assert!(workshop.bytes("x.fmu") == workshop.bytes("y.fmu"));
     workshop.punctual(["build", "filter.toml", "-o", "z.fmu", "--fmi", "3"]).success();
     assert!(workshop.bytes("z.fmu") == workshop.bytes("x-fmi3.fmu"), "the same file");
-    // Ours find nothing in them.
+    // `validate` finds nothing in them.
     workshop.punctual(["validate", "x-fmi3.fmu"]).success();
     workshop.punctual(["build", "filter.toml", "-o", "s.fmu", "--fmi", "3", "--scalars"]).success();
     workshop.punctual(["validate", "s.fmu"]).success();
@@ -75,7 +75,7 @@ fn the_option_goes_before_the_variable() {
     workshop.punctual(["build", "filter.toml", "-o", "x.fmu", "--library", "library"]).success();
     let done = workshop.punctual(["build", "filter.toml", "-o", "y.fmu"]);
     done.fails_like(2, "cannot read nowhere.so: ", &[]);
-    // An empty variable is none.
+    // An empty variable counts as unset.
     let workshop = workshop.with_variable("PUNCTUAL_FMU_LIBRARY", "");
     workshop.punctual(["build", "filter.toml", "-o", "z.fmu"]).success();
 }
@@ -88,8 +88,8 @@ fn a_library_that_is_none_leaves_no_fmu_behind() {
     assert_eq!(workshop.files(), ["filter.toml", "library"]);
 }
 
-/// The library of this build, said to be for another processor: the second half word of what an ELF file's header holds
-/// after its 16 bytes of identification.
+/// The library of this build, marked as one for another processor: in the header of an ELF file, that is the
+/// second 16-bit word after the 16 bytes of identification.
 fn foreign() -> Vec<u8> {
     const AARCH64: u16 = 183;
     let mut bytes = fs::read(library()).expect("the library");
@@ -106,7 +106,7 @@ fn one_fmu_for_several_platforms() {
     workshop.punctual(both).success();
     assert!(workshop.punctual(["inspect", "both.fmu"]).success().contains("aarch64-linux, linux64"));
     workshop.punctual(["validate", "both.fmu"]).success();
-    // What is joined from two is the same, but for the order of the files.
+    // The result of merging two is the same, apart from the order of the files.
     for (library, name) in [("library", "here.fmu"), ("arm.so", "there.fmu")] {
         let done = workshop.punctual(["build", "filter.toml", "-o", name, "--library", library]);
         assert_eq!(done.stderr.contains("not tried: "), name == "there.fmu", "{}", done.stderr);

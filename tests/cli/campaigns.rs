@@ -1,4 +1,5 @@
-//! `punctual campaign` and `punctual replay`: rows against `punctual run`, interruption at any point, errors.
+//! `punctual campaign` and `punctual replay`: rows compared with `punctual run`, interruption at any point,
+//! errors.
 
 use std::fs;
 use std::path::Path;
@@ -14,7 +15,7 @@ use crate::misbehaving;
 use crate::table::Table;
 use crate::workshop::{Workshop, examples};
 
-/// Steps of the runs here, in s: coarse, for speed.
+/// Communication step in s: coarse, for speed.
 const STEP: &str = "step = 0.05";
 
 /// The example's system in these steps.
@@ -22,8 +23,8 @@ fn system() -> String {
     crate::running::system(&[("step = 0.001", STEP), ("stop_time = 20.0", "stop_time = 12.0")])
 }
 
-/// A campaign of `runs` runs over starts and bounds. 0.1 m/s2 both ways is too little, 20 either way is enough,
-/// and a lower bound above the upper one is refused.
+/// A campaign of `runs` runs over starts and bounds. 0.1 m/s2 in both directions is too little, 20 in either
+/// is enough, and a lower bound above the upper one is refused.
 fn file(runs: u64, sampling: &str) -> String {
     format!(
         "system = \"system.toml\"\n[campaign]\nruns = {runs}\nseed = 7\nsampling = \"{sampling}\"\n\
@@ -43,7 +44,7 @@ fn with_fmus(runs: u64, sampling: &str) -> Workshop {
     workshop
 }
 
-/// A workshop with the configurations in place of the FMUs made from them, so that nothing is unpacked.
+/// A workshop with the configurations in place of the FMUs, so that nothing is unpacked.
 fn workshop(runs: u64, sampling: &str) -> Workshop {
     let workshop = Workshop::new();
     for name in ["filter", "plant"] {
@@ -72,8 +73,8 @@ fn number(cell: &Cell) -> Option<f64> {
     }
 }
 
-/// Compares a row with the findings of `punctual run` with the library of an FMU, from the start that `--list`
-/// tells. They agree in every bit of every recorded signal, and in each measure by its definition.
+/// Compares a row with the findings of `punctual run` with the library of an FMU, from the start that
+/// `--list` reports. Every recorded signal agrees bitwise, and each measure agrees by its definition.
 #[test]
 fn a_row_is_what_a_run_of_the_fmus_finds() {
     let workshop = with_fmus(8, "latin_hypercube");
@@ -170,7 +171,7 @@ fn begin(workshop: &Workshop, more: &[&str]) -> Child {
         .expect("the binary under test starts")
 }
 
-/// The runs that are kept in segments.
+/// The runs in the segments so far.
 fn kept(workshop: &Workshop) -> u64 {
     let Ok(entries) = fs::read_dir(workshop.path("cut.parquet.parts")) else { return 0 };
     let names = entries.flatten().map(|e| e.file_name().to_string_lossy().into_owned());
@@ -189,16 +190,16 @@ fn wait(workshop: &Workshop, child: &mut Child, kept_before: u64, more: Duration
     thread::sleep(more);
 }
 
-/// Enough runs to be ended three times, and not many more, since a debug build is slow.
+/// Enough runs to be interrupted three times, but not many more, since a debug build is slow.
 const MANY: u64 = if cfg!(debug_assertions) { 120 } else { 40_000 };
 
-/// Killed, interrupted, killed again, on one and on two threads: the same file.
+/// Killed, interrupted, and killed again, on one and on two threads, it gives the same file.
 #[test]
 fn a_campaign_can_be_ended_at_any_point() {
     let workshop = workshop(MANY, "random");
     workshop.write("system.toml", workshop.text("system.toml").replace(STEP, "step = 0.25"));
     let mut before = 0;
-    // Any instant from the middle of a segment to that of its file.
+    // Any instant between two segments.
     let moment = || {
         let now = SystemTime::now().duration_since(UNIX_EPOCH).expect("after 1970");
         Duration::from_micros(u64::from(now.subsec_nanos()) % 20_000)
@@ -213,7 +214,7 @@ fn a_campaign_can_be_ended_at_any_point() {
         assert_eq!(code, (ending == "-INT").then_some(130));
         before = kept(&workshop);
         assert!(before > 0 && before < MANY, "{before}");
-        // A page of the rows there are, and of no others.
+        // A page with the rows so far, and no others.
         assert_eq!(workshop.path("cut.html").exists(), ending == "-INT" || threads == "2");
         if ending == "-INT" {
             let page = workshop.text("cut.html");
@@ -222,7 +223,7 @@ fn a_campaign_can_be_ended_at_any_point() {
             assert!(runs > 0 && runs <= before, "{runs} of {before}");
         }
     }
-    // Another campaign does not go on from there.
+    // Another campaign does not resume from there.
     workshop.write("c.toml", file(MANY, "random") + "# another\n");
     let folder = "cut.parquet.parts";
     let begin_of_message = format!("--output: {folder} is of another campaign (fingerprint ");
@@ -240,7 +241,7 @@ fn a_campaign_can_be_ended_at_any_point() {
     workshop.punctual(["campaign", "c.toml", "-o", "whole.parquet", "--threads", "1"]).success();
     assert!(workshop.bytes("cut.parquet") == workshop.bytes("whole.parquet"), "the bytes differ");
 
-    // A complete campaign is not made again, and stays.
+    // A complete campaign is not repeated, and its file is kept.
     let again: Value = serde_json::from_str(
         &workshop.punctual(["campaign", "c.toml", "-o", "cut.parquet", "--json"]).success(),
     )
@@ -253,7 +254,7 @@ fn a_campaign_can_be_ended_at_any_point() {
         &[],
     );
 
-    // The summary, against the rows.
+    // The summary, compared with the rows.
     let (names, rows) = rows(&workshop.path("whole.parquet"));
     let success = names.iter().position(|n| n == "success").expect("a column");
     let count = rows.iter().filter(|row| matches!(row[success], Cell::Flag(true))).count();
@@ -261,15 +262,15 @@ fn a_campaign_can_be_ended_at_any_point() {
         (report["success"]["count"].as_u64(), report["runs"].as_u64()),
         (Some(count as u64), Some(MANY))
     );
-    // A third of the bounds is too little, a quarter contradicts: half succeed at most, to 1/√(4·120) = 0.046 for
-    // 120 runs; the tolerance is five of these.
+    // A third of the bounds is too little and a quarter contradictory, so at most half succeed, within
+    // 1/√(4·120) = 0.046 for 120 runs; the tolerance is five of these.
     let rate = count as f64 / MANY as f64;
     assert!(rate > 0.0 && rate < 0.5 + 5.0 * 0.046, "{rate}");
     let worst = report["worst"].as_array().expect("a list");
     assert_eq!((worst.len(), &worst[0]["success"]), (10, &false.into()));
 }
 
-/// Rows that are kept and damaged, or gone, are made again, and no others.
+/// Rows whose segments are damaged or missing are made again, but no others.
 #[test]
 fn what_is_damaged_among_the_rows_kept_is_made_again() {
     let workshop = workshop(20, "random");
@@ -293,7 +294,7 @@ fn what_is_damaged_among_the_rows_kept_is_made_again() {
         assert!(!workshop.path("cut.parquet.parts").exists());
         fs::remove_file(workshop.path("cut.parquet")).expect("a file");
     };
-    // Of 20 runs 3 are in half of a file, 4 in one with another bit, 5 in none. 8 are kept.
+    // Of 20 runs, 3 are in half a file, 4 in one with a flipped bit, 5 in none. 8 are kept.
     begin();
     segment(0, 2);
     let (half, flipped) = (segment(2, 5), segment(5, 9));
@@ -301,7 +302,7 @@ fn what_is_damaged_among_the_rows_kept_is_made_again() {
     let bytes = workshop.bytes(&half);
     workshop.write(&half, &bytes[..bytes.len() / 2]);
     let mut bytes = workshop.bytes(&flipped);
-    // Of the seed of a run: a random number, which stands there as it is.
+    // The seed of a run: a random number, which is stored verbatim.
     let (_, rows) = rows(&workshop.path("whole.parquet"));
     let Cell::Count(seed) = rows[6][1] else { panic!("a seed is a count") };
     let at = bytes.windows(8).position(|w| w == seed.to_le_bytes()).expect("the seed of run 6");
@@ -314,7 +315,7 @@ fn what_is_damaged_among_the_rows_kept_is_made_again() {
     );
     made.success();
     is_whole();
-    // A run that is there twice is told.
+    // A duplicate run is reported.
     begin();
     segment(3, 8);
     let twice = segment(7, 9);
@@ -324,7 +325,7 @@ fn what_is_damaged_among_the_rows_kept_is_made_again() {
     is_whole();
 }
 
-/// A row that differs from its run is told, with the column.
+/// A row that differs from its run is reported, with the column.
 #[test]
 fn a_row_that_was_changed_is_told() {
     let workshop = workshop(20, "sobol");
@@ -338,7 +339,7 @@ fn a_row_that_was_changed_is_told() {
     );
     let (names, rows) = rows(&workshop.path("c.parquet"));
     let column = names.iter().position(|n| n == "plant.x0.x_p").expect("a column");
-    // The least and the greatest number stand in the statistics too.
+    // The least and the greatest number are also in the statistics.
     let mut sorted: Vec<f64> = rows.iter().filter_map(|row| number(&row[column])).collect();
     sorted.sort_by(f64::total_cmp);
     let value = sorted[10];
@@ -371,7 +372,7 @@ fn a_row_that_was_changed_is_told() {
     workshop.punctual(["replay", "c.toml", "--run", "0"]).fails_like(2, "cannot read c.toml: ", &[]);
 }
 
-/// The draws depend on the file and the number alone.
+/// The draws depend only on the file and the number.
 #[test]
 fn runs_are_listed_as_they_are_drawn() {
     for sampling in ["random", "latin_hypercube", "sobol"] {
@@ -456,12 +457,12 @@ fn each_defect_is_told_with_its_field() {
     );
 }
 
-/// The numbers of a list of JSON; NaN for what is none.
+/// The numbers of a JSON list; NaN for anything else.
 fn numbers(list: &Value) -> Vec<f64> {
     list.as_array().expect("a list").iter().map(|v| v.as_f64().unwrap_or(f64::NAN)).collect()
 }
 
-/// The page of a campaign, against its rows.
+/// The page of a campaign, compared with its rows.
 #[test]
 fn a_report_has_the_runs_and_how_to_see_them_again() {
     /// One of them arrives late.
@@ -477,9 +478,9 @@ fn a_report_has_the_runs_and_how_to_see_them_again() {
     };
     let count = |name: &str| column(name).iter().filter(|flag| **flag == Some(1.0)).count();
     let page = workshop.text("c.html");
-    // The name of SVG elements is no address that is asked.
+    // The SVG namespace is not an address that is requested.
     assert!(!page.replace("http://www.w3.org/2000/svg", "").contains("http"), "an address");
-    // Every run has its place, and every number that differs is an axis.
+    // Every run is included, and every quantity that differs is an axis.
     let scene = data(&page, "scene");
     assert_eq!(numbers(&scene["runs"]), (0..RUNS).map(f64::from).collect::<Vec<_>>());
     let good: Vec<Option<f64>> = scene["good"]
@@ -504,15 +505,15 @@ fn a_report_has_the_runs_and_how_to_see_them_again() {
             assert!(same, "{name}: {drawn}, not {recorded:?}");
         }
     }
-    // The lower bound decides, not the start: it is shown first.
+    // Success depends on the lower bound and not on the start, so that is shown first.
     assert!(numbers(&scene["shown"]).contains(&1.0), "{}", scene["shown"]);
     let picture = workshop.text("c.svg");
     // A mark for each run that fails, and one in the legend.
     assert_eq!(picture.matches("l6 6m0 -6l-6 6").count(), RUNS as usize - count("success") + 1);
-    // All are first ones, so cells count them all; whoever reads says how they are shown.
+    // All runs are among the first ones, so the cells count them all; the reader chooses how they are shown.
     assert_eq!(scene["first"], RUNS);
     assert!(page.contains(">rate of success by cell</option>"), "a choice");
-    // The bars count what the rows say, on the side of the deadline where it was.
+    // The bars count the rows, on the correct side of the deadline.
     let arrivals = &scene["arrivals"][0];
     let (on_time, arrived) =
         (count("filter.goal.on_time"), column("filter.goal.arrival").iter().flatten().count());
@@ -539,8 +540,11 @@ fn a_report_has_the_runs_and_how_to_see_them_again() {
     assert!(texts.iter().any(|text| text.starts_with(&rate)), "{texts:?}");
     let [low, high] = [0, 1].map(|end| report["success"]["interval"][end].as_f64().expect("a number"));
     let interval = texts.iter().find(|text| text.starts_with("The rate of success is ")).expect("a sentence");
-    let told: Vec<f64> = interval.split([' ', '\u{202f}']).filter_map(|word| word.parse().ok()).collect();
-    assert!((told[0] - 100.0 * low).abs() < 0.005 && (told[1] - 100.0 * high).abs() < 0.005, "{interval}");
+    let printed: Vec<f64> = interval.split([' ', '\u{202f}']).filter_map(|word| word.parse().ok()).collect();
+    assert!(
+        (printed[0] - 100.0 * low).abs() < 0.005 && (printed[1] - 100.0 * high).abs() < 0.005,
+        "{interval}"
+    );
     assert!(interval.contains("a rough guide"), "{interval}");
     let cells = cells(&tree);
     let row = |name: &str| cells.iter().find(|row| row[0] == name).unwrap_or_else(|| panic!("no {name}"));
@@ -552,7 +556,7 @@ fn a_report_has_the_runs_and_how_to_see_them_again() {
     let first = commands.iter().find_map(|node| node.text()).expect("a command");
     assert_eq!(first, format!("punctual replay c.parquet --run {} --out out", report["worst"][0]["run"]));
     workshop.punctual(first.split(' ').skip(1)).success();
-    // It is written again without a run; and only where it does not take the place of the rows.
+    // The page is written again without a run, but never over the file of the rows.
     fs::remove_file(workshop.path("c.html")).expect("the page");
     workshop.punctual(["campaign", "c.toml", "--report"]).success();
     assert_eq!(workshop.text("c.html"), page);
@@ -562,7 +566,7 @@ fn a_report_has_the_runs_and_how_to_see_them_again() {
     );
 }
 
-/// Deadlines that are varied, names that are no names, and nothing to choose from.
+/// Varied deadlines, names that need escaping, and nothing to choose from.
 #[test]
 fn a_report_counts_from_the_deadline_where_that_is_varied() {
     let workshop = workshop(6, "random");
@@ -589,7 +593,7 @@ fn a_report_counts_from_the_deadline_where_that_is_varied() {
         (&"arrival, from the deadline on (s)".into(), &0.0.into())
     );
     assert!(numbers(&chart["curves"][0]["x"]).iter().all(|t| (-11.0..=0.0).contains(t)), "{chart}");
-    // All runs alike: there is nothing to draw them over.
+    // All runs are alike, so there is nothing to draw them over.
     fs::remove_file(workshop.path("c.parquet")).expect("the rows");
     fs::remove_file(workshop.path("c.svg")).expect("the picture");
     workshop.write("c.toml", head);
@@ -604,7 +608,7 @@ fn a_report_counts_from_the_deadline_where_that_is_varied() {
     assert!(!workshop.path("c.svg").exists());
 }
 
-/// An inline system, of configurations in place of FMUs, with a disturbance whose seed is the run's own.
+/// An inline system with configurations in place of FMUs, and a disturbance whose seed is the run's own.
 #[test]
 fn a_campaign_needs_no_fmus() {
     let workshop = workshop(1, "random");
@@ -637,7 +641,7 @@ fn a_campaign_needs_no_fmus() {
         .fails(2, "c.toml: system.experiment.step: is -0.05 s; must be > 0");
 }
 
-/// An FMU by another version of this program cannot run in process, and the message says so.
+/// An FMU built by another version of this program cannot run in process, and the message says so.
 #[test]
 fn fmus_of_another_version_are_refused() {
     let workshop = with_fmus(3, "random");
@@ -678,7 +682,8 @@ fn the_example_runs() {
     }
 }
 
-/// Parts made apart, one of them killed on the way, are the campaign of one machine; whatever is no part of it is named.
+/// Parts made separately, one of them interrupted, join to the campaign of one machine. Anything that is not
+/// a part of it is named.
 #[test]
 fn shards_join_to_the_campaign_of_one_machine() {
     let workshop = workshop(20, "latin_hypercube");
@@ -700,7 +705,7 @@ fn shards_join_to_the_campaign_of_one_machine() {
         2,
         "--join: the runs 6..13 are both in c.2-of-3.parquet and in c.2-of-3.parquet; leave one out",
     );
-    // Half of a file, and none at all, though it was begun.
+    // Half a file, and none at all although it was begun.
     let bytes = workshop.bytes(second);
     workshop.write("half.parquet", &bytes[..bytes.len() / 2]);
     join(&[first, "half.parquet", third]).fails_like(
@@ -713,7 +718,7 @@ fn shards_join_to_the_campaign_of_one_machine() {
         2,
         "--join: begun.parquet is not complete: what is there is in begun.parquet.parts, and the same --shard goes on",
     );
-    // A bit that a disk has changed is seen, or changes nothing.
+    // A bit flipped by a disk is detected, or changes nothing.
     let mut damaged = 0;
     for k in 0..24 {
         let mut flipped = bytes.clone();
@@ -729,7 +734,7 @@ fn shards_join_to_the_campaign_of_one_machine() {
         }
     }
     assert!(damaged > 0, "no checksum was compared");
-    // Another version, where the text stands in the file.
+    // Another version, wherever the file contains it as text.
     let mut other = bytes.clone();
     let key = other.windows(16).position(|w| w == b"punctual.version").expect("the key");
     let ours = env!("CARGO_PKG_VERSION").as_bytes();
@@ -772,7 +777,7 @@ fn shards_join_to_the_campaign_of_one_machine() {
     of_part("plant.parquet", "plant.toml", "[disturbance]\nperiod = 0.1\ninputs = { a = 0.1 }\n", message);
     assert!(!workshop.path("joined.parquet").exists() && !workshop.path("joined.parquet.parts").exists());
 
-    // A folder stands for its files. The rows are those of one machine, and what is told of them too.
+    // A folder stands for its files. The rows, and all reports on them, are those of one machine.
     fs::create_dir(workshop.path("all")).expect("a folder");
     for name in [first, second, third] {
         workshop.write(&format!("all/{name}"), workshop.bytes(name));
@@ -780,14 +785,14 @@ fn shards_join_to_the_campaign_of_one_machine() {
     let report: Value = serde_json::from_str(&join(&["all", "--json", "--report"]).success()).expect("JSON");
     assert!(workshop.bytes("joined.parquet") == workshop.bytes("whole.parquet"), "the bytes differ");
     assert_eq!((&report["runs"], &report["report"][0]), (&20.into(), &"joined.html".into()));
-    // Once more into the same folder: a whole result there is no part.
+    // Once more into the same folder: a complete result there does not count as a part.
     for _ in 0..2 {
         workshop.punctual(["campaign", "c.toml", "-o", "all/joined.parquet", "--join", "all"]).success();
     }
     workshop.punctual(["campaign", "c.toml", "-o", "again.parquet", "--join", "all"]).success();
     assert!(workshop.bytes("again.parquet") == workshop.bytes("whole.parquet"), "the bytes differ");
     join(&[first, "nothing.parquet"]).fails(2, "--join: nothing.parquet is not there");
-    // A part tells its own runs, and no others.
+    // A part knows its own runs, and no others.
     workshop.punctual(["replay", second, "--run", "6"]).success();
     workshop.punctual(["replay", second, "--run", "12"]).success();
     workshop.punctual(["replay", second, "--run", "13"]).fails(2, "--run: is 13, must be from 6 to 12");
@@ -805,7 +810,7 @@ fn shards_join_to_the_campaign_of_one_machine() {
     shard("6..21").fails(2, "--shard: ends at 21, must be at most 20, the number of runs");
 }
 
-/// A shard that was killed goes on, and only as that shard.
+/// A shard that was killed resumes, but only as the same shard.
 #[test]
 fn a_shard_can_be_ended_at_any_point() {
     let workshop = workshop(MANY, "random");
@@ -827,7 +832,7 @@ fn a_shard_can_be_ended_at_any_point() {
     assert!(workshop.bytes("cut.parquet") == workshop.bytes("whole.parquet"), "the bytes differ");
 }
 
-/// One file is enough on another machine; one that was changed or is of another version is none.
+/// One file is enough on another machine. It is refused if it was changed or comes from another version.
 #[test]
 fn a_packed_campaign_needs_no_other_file() {
     let workshop = with_fmus(6, "random");
@@ -835,7 +840,7 @@ fn a_packed_campaign_needs_no_other_file() {
     workshop.punctual(["campaign", "c.toml", "--pack", "new/folder/c.json"]).success();
     workshop.punctual(["campaign", "c.toml", "--pack", "c.json"]).success();
     assert_eq!(workshop.text("new/folder/c.json"), workshop.text("c.json"));
-    // What it wrote it writes again, and nothing else.
+    // It may overwrite its own output, but nothing else.
     workshop.punctual(["campaign", "c.toml", "--pack", "c.json"]).success();
     workshop
         .punctual(["campaign", "c.toml", "--pack", "c.toml"])
@@ -858,8 +863,8 @@ fn a_packed_campaign_needs_no_other_file() {
     refused(packed[..packed.len() / 2].to_owned(), "is not a complete campaign written by `--pack`");
 }
 
-/// A plant whose way is the sum of four normal numbers times 1 - exp(-2), and a wall at `d` (m) that nothing keeps it
-/// from: the filter acts on nothing.
+/// A plant whose distance is the sum of four normal numbers times 1 - exp(-2), and a wall at `d` (m) that
+/// nothing keeps it from, since the filter acts on nothing.
 fn drifting(workshop: &Workshop, d: f64) -> String {
     let model = "[plant]\nstates = [{ name = \"x\", unit = \"m\" }, { name = \"a\" }, { name = \"b\" }, { name = \"c\" }, \
                  { name = \"d\" }]\ninputs = [{ name = \"u\" }]\n[plant.derivatives]\n\
@@ -882,11 +887,12 @@ fn drifting(workshop: &Workshop, d: f64) -> String {
     [system, &connected.concat(), campaign, &varied.collect::<String>()].concat()
 }
 
-/// A probability that is known, and the worst run again.
+/// A known probability, and a replay of the worst run.
 #[test]
 fn a_rare_failure_is_estimated_and_shown() {
     let workshop = Workshop::new();
-    // 2.17009 deviations, 2 (1 - exp(-2)) m each: fifteen in a thousand, by tables of the normal distribution.
+    // 2.17009 standard deviations of 2 (1 - exp(-2)) m each: a probability of 0.015, by tables of the normal
+    // distribution.
     let text = drifting(&workshop, 2.170_090 * 2.0 * (1.0 - (-2.0_f64).exp()));
     workshop.write("c.toml", &text);
     let rare = |more: &[&str]| workshop.punctual([&["campaign", "c.toml"], more].concat());
@@ -896,7 +902,7 @@ fn a_rare_failure_is_estimated_and_shown() {
     assert!(interval[0] > 0.0075 && interval[1] < 0.03, "{report}");
     let levels = numbers(&report["levels"]);
     assert!(levels.len() == 2 && levels.is_sorted_by(|a, b| a > b) && levels[1] >= 0.0, "{levels:?}");
-    // Where it says, and as bad as it says.
+    // The replay ends where the estimate says, and as badly.
     let values = report["worst"]["values"].as_array().expect("a list");
     let sum: f64 = values.iter().filter_map(|value| value["value"].as_f64()).sum();
     let least = report["worst"]["least_h"].as_f64().expect("a number");
@@ -908,7 +914,7 @@ fn a_rare_failure_is_estimated_and_shown() {
     let (names, rows) = rows(&workshop.path("c-worst.parquet"));
     let place = names.iter().position(|n| n == "filter.wall.least_h").expect("a column");
     assert_eq!(number(&rows[0][place]).map(f64::to_bits), Some(least.to_bits()));
-    // The number of threads does not show.
+    // The result does not depend on the number of threads.
     let one = rare(&["--rare=5", "--json", "--threads", "1", "-o", "again.parquet"]).success();
     let one: Value = serde_json::from_str(&one).expect("JSON");
     assert_eq!((&one["probability"], &one["interval"]), (&report["probability"], &report["interval"]));
@@ -942,7 +948,7 @@ fn a_rare_failure_is_estimated_and_shown() {
         text.clone() + seed + period,
         "vary.\"plant.disturbance.seed\".distribution: is \"seed\" where plant.disturbance.period is varied too; --rare takes one of them",
     );
-    // A start that nothing makes fail: there is no way on, which is no probability.
+    // No drawn start can fail, so there is no way to failure and no estimate of its probability.
     let narrow = text.replace(
         "distribution = \"normal\"\nmean = 0\ndeviation = 1",
         "distribution = \"choice\"\nvalues = [0.0, 0.1]",
@@ -950,7 +956,7 @@ fn a_rare_failure_is_estimated_and_shown() {
     refused(narrow, "--rare: found no path to a failure: the least h that ");
 }
 
-/// Runs that end before a deadline keep no promise: the reason is said, whatever is asked.
+/// Runs that end before a deadline keep no promise, and every command gives this reason.
 #[test]
 fn runs_that_end_before_a_deadline_say_so() {
     let workshop = Workshop::new();
@@ -965,16 +971,16 @@ fn runs_that_end_before_a_deadline_say_so() {
     assert_eq!(noted(&["campaign", "c.toml"]), note);
     let note = format!("note: the worst run lacks an h that counts; {counts}\n");
     assert_eq!(noted(&["campaign", "c.toml", "--rare=5"]), note);
-    // With a deadline in time there is nothing to say.
+    // With a deadline in time there is nothing to report.
     deadline(1.5);
     assert_eq!(noted(&["campaign", "c.toml", "-o", "in_time.parquet"]), "");
 }
 
-/// A wall that noise alone comes to: as often by `--rare` as by plain sampling, and the worst course again.
+/// A wall that only noise can reach: `--rare` agrees with plain sampling, and the worst run is replayed.
 #[test]
 fn a_rare_sequence_of_noise_is_estimated_and_shown() {
     let workshop = Workshop::new();
-    // x(2) is a fifth of the sum of ten numbers uniform from -1 to 1: about one in 100 comes to 0.84.
+    // x(2) is a fifth of the sum of ten numbers uniform from -1 to 1: about one in 100 reaches 0.84.
     let text = drifting(&workshop, 0.84);
     let (system, _) = text.split_once("[vary.").expect("the first table");
     let text = system.replace("step = 1.0", "step = 0.1")
@@ -995,7 +1001,7 @@ fn a_rare_sequence_of_noise_is_estimated_and_shown() {
         "{found:?}"
     );
 
-    // The worst course is a file of its own, with a seed for each period.
+    // The worst run is a file of its own, with a seed for each period.
     assert_eq!(rare["worst"]["values"][0]["changes"], 11, "{rare}");
     let least = rare["worst"]["least_h"].as_f64().expect("a number");
     assert!(least < 0.0);
@@ -1006,7 +1012,7 @@ fn a_rare_sequence_of_noise_is_estimated_and_shown() {
     assert_eq!(number(&rows[0][place]).map(f64::to_bits), Some(least.to_bits()));
 }
 
-/// Killed and interrupted, an estimate goes on with the same numbers.
+/// Killed and interrupted, an estimate resumes and gives the same numbers.
 #[test]
 fn a_rare_estimate_can_be_ended_at_any_point() {
     let workshop = Workshop::new();
@@ -1032,17 +1038,17 @@ fn a_rare_estimate_can_be_ended_at_any_point() {
         let output = child.wait_with_output().expect("a child");
         assert_eq!(output.status.code(), (ending == "-INT").then_some(130));
         before = kept().expect("repeats");
-        let told = String::from_utf8_lossy(&output.stderr);
+        let printed = String::from_utf8_lossy(&output.stderr);
         let note =
             format!("interrupted with {before} of 10000 repeats kept; the same command goes on from there");
-        assert_eq!(told.contains(&note), ending == "-INT", "{told}");
+        assert_eq!(printed.contains(&note), ending == "-INT", "{printed}");
     }
-    // Another campaign does not go on from there.
+    // Another campaign does not resume from there.
     let text = workshop.text("c.toml");
     workshop.write("c.toml", text.clone() + "# another\n");
     let message = "--output: cut.parquet.rare.parts is of another campaign (fingerprint ";
     workshop.punctual(["campaign", "c.toml", "--rare", "-o", "cut.parquet"]).fails_like(2, message, &[]);
-    // Nor where the file that says so is gone.
+    // Neither does this one if the file with the fingerprint is gone.
     let fingerprint = made.with_file_name("fingerprint");
     fs::remove_file(&fingerprint).expect("a file");
     let message = "--output: cut.parquet.rare.parts/made is of another campaign (fingerprint ";
@@ -1050,7 +1056,7 @@ fn a_rare_estimate_can_be_ended_at_any_point() {
     refused().fails_like(2, message, &[]);
     fs::remove_file(&fingerprint).expect("a file");
     workshop.write("c.toml", text);
-    // One number that has changed, and half a file.
+    // One changed number, and half a file.
     let good = fs::read_to_string(&made).expect("a text");
     let another = good.replacen("\"probability\":0", "\"probability\":1", 1);
     assert_ne!(another, good);
@@ -1068,11 +1074,11 @@ fn a_rare_estimate_can_be_ended_at_any_point() {
     assert!(!made.parent().expect("a folder").exists());
 }
 
-/// An FMU of another program runs too, in an instance of its own for each run, since its reset forgets nothing.
+/// An FMU of another program runs too, with a new instance for each run, since its reset forgets nothing.
 #[test]
 fn a_campaign_takes_fmus_of_others() {
     let workshop = Workshop::new();
-    // Its output counts its steps, so the plant goes 1 m and then 2 m further.
+    // Its output counts its steps, so the plant moves 1 m and then 2 m further.
     misbehaving::write(
         &workshop,
         "counter.fmu",
@@ -1092,7 +1098,7 @@ fn a_campaign_takes_fmus_of_others() {
     for row in &found {
         let of = |name: &str| number(&row[place(name)]).expect("a number");
         let sum: f64 = ["a", "b", "c", "d"].iter().map(|state| of(&format!("plant.x0.{state}"))).sum();
-        // Where the states pull back, it may be furthest before the end.
+        // If the states pull it back, the maximum may be before the end.
         let reached = [0.0, sum * (1.0 - (-1.0_f64).exp()) + 1.0, sum * way + 3.0];
         let expected = d - reached.into_iter().fold(0.0, f64::max);
         let least = of("filter.wall.least_h");
@@ -1104,12 +1110,12 @@ fn a_campaign_takes_fmus_of_others() {
     let replay = || workshop.punctual(["replay", "c.parquet", "--run", "8"]);
     let again = replay().success();
     assert!(again.contains("the row is as recorded, bit for bit"), "{again}");
-    // Fifteen failures in a thousand, as without it.
+    // A failure probability of 0.015, as without the FMU.
     let rare: Value = serde_json::from_str(&campaign(&["--rare=5", "--json"]).success()).expect("JSON");
     let interval = numbers(&rare["interval"]);
     assert!(interval[0] < 0.015 && 0.015 < interval[1] && interval[1] < 0.03, "{rare}");
 
-    // Beside what is said of units.
+    // Apart from the notes on units.
     let done = campaign(&["--pack", "c.json"]);
     let refused = "error: --pack: counter.fmu of component \"counter\" is an FMU of another program, which is not packed; run \
                    shards where its file is\n";
@@ -1133,7 +1139,7 @@ fn a_campaign_takes_fmus_of_others() {
     );
 }
 
-/// A course of values: what may change in a run takes it, at the times that it says.
+/// A sequence of values: whatever may change during a run takes them at the stated times.
 #[test]
 fn a_sequence_is_the_same_in_every_run() {
     let workshop = Workshop::new();
@@ -1145,7 +1151,7 @@ fn a_sequence_is_the_same_in_every_run() {
     workshop.punctual(["campaign", "c.toml"]).success();
     let (names, rows) = rows(&workshop.path("c.parquet"));
     let place = names.iter().position(|n| n == "filter.wall.least_h").expect("a column");
-    // x(1) = 1 is the greatest.
+    // The maximum is x(1) = 1.
     for row in &rows {
         assert_eq!(number(&row[place]), Some(8.0));
     }

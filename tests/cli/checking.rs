@@ -1,4 +1,4 @@
-//! `punctual check`: its findings on filters and plants, its warnings and its codes.
+//! `punctual check`: its findings on filters and plants, its warnings and its exit codes.
 
 use std::fs;
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::workshop::{Workshop, assert_golden, examples};
 
-/// Steps that are long enough for a closed loop in a test.
+/// Steps that are coarse enough for a closed loop in a test.
 const COARSE: (&str, &str) = ("step_size = 0.001", "step_size = 0.05");
 
 /// The example's filter and plant, the filter with edits.
@@ -69,10 +69,10 @@ fn a_filter_that_is_given_the_derivatives() {
     }
     let text = fs::read_to_string(workshop.path("external.toml")).expect("written above");
     workshop.write("zero.toml", text.replace("margin = 0.05", "margin = 0.0 "));
-    let told = workshop.punctual(["check", "zero.toml"]).success();
+    let printed = workshop.punctual(["check", "zero.toml"]).success();
     let wanted =
         "warning: goal, speed: the margin is 0, so that an input held over 0.01 s can cost the deadline\n";
-    assert!(told.contains(wanted), "{told}");
+    assert!(printed.contains(wanted), "{printed}");
 }
 
 #[test]
@@ -112,7 +112,7 @@ fn warnings_name_what_does_not_fit_the_step() {
         warnings(&zero, &[]),
         ["goal: the margin is 0, so that an input held over 0.001 s can cost the deadline"]
     );
-    // The default rates heed the step; rates given are taken as they are.
+    // The default rates take the step into account; given rates are used unchanged.
     let long = [("step_size = 0.001", "step_size = 2.0"), ("deadline = 10.0", "deadline = 1.0")];
     assert_eq!(warnings(&workshop(&long), &[]), ["goal: the deadline is shorter than the step of 2 s"]);
     let given = ("margin = 0.02 ", "rate = 20.0\nmargin = 0.02 ");
@@ -129,7 +129,7 @@ fn warnings_name_what_does_not_fit_the_step() {
     assert_eq!(warnings(&short, &[]), ["goal: the experiment stops before the deadline"]);
 }
 
-/// Bounds that the start asks too much of: the promise cannot be given, and the code shows it.
+/// Bounds too small for the start: the promise cannot be given, and the exit code shows it.
 #[test]
 fn a_start_without_a_guarantee_is_code_one() {
     let workshop = workshop(&[("[experiment]", "[bounds]\na = [-0.01, 0.01]\n[experiment]"), COARSE]);
@@ -139,7 +139,7 @@ fn a_start_without_a_guarantee_is_code_one() {
     assert!(done.stdout.contains("warning: goal: not to be relied on from this start\n"), "{done:#?}");
 }
 
-/// Standing still and heading across the line to the goal: no input moves h at that instant.
+/// At rest, with the heading perpendicular to the line to the goal, no input moves h at that instant.
 #[test]
 fn a_start_without_authority_is_code_one() {
     let across = format!("theta={}", 0.75 * std::f64::consts::PI);
@@ -184,7 +184,7 @@ fn starts_that_cannot_be_used() {
         .fails(2, "other.toml: plant.model: has no state theta, which the filter measures");
 }
 
-/// From 60.8 m at 0.1 m/s² no input is there within 10 s; with 20 m/s² the filter is.
+/// From 60.8 m at 0.1 m/s², no input arrives within 10 s; with 20 m/s² the filter does.
 #[test]
 fn bounds_decide_what_deadline_can_be_met() {
     let with = |limit: &str| {
@@ -197,7 +197,7 @@ fn bounds_decide_what_deadline_can_be_met() {
     };
     let (code, lost) = with("0.1");
     assert_eq!((code, &lost["deadline"]), (1, &"cannot_be_met".into()), "{lost}");
-    // √(2 · 61.64/0.1), and more.
+    // At least √(2 · 61.64/0.1).
     let (least, most) = (lost["earliest_at_least"].as_f64(), lost["earliest_at_most"].as_f64());
     assert!(least.is_some_and(|t| (t - 35.11).abs() < 0.01) && most >= least, "{lost}");
     let (code, met) = with("20.0");
@@ -206,7 +206,7 @@ fn bounds_decide_what_deadline_can_be_met() {
     assert!(most.is_some_and(|t| t < 10.0) && most >= met["earliest_at_least"].as_f64(), "{met}");
 }
 
-/// The table and the lines to paste; with these the deadline is kept, with less it was not.
+/// The table and the lines to paste. With these the deadline is kept, with smaller bounds it was not.
 #[test]
 fn the_least_effort_from_a_start() {
     let edits = [("step_size = 0.001", "step_size = 0.05")];
@@ -234,7 +234,7 @@ fn the_least_effort_from_a_start() {
     );
 }
 
-/// A plan is searched for where every input has bounds, and found where there is time enough.
+/// A plan is searched for if every input has bounds, and found if there is enough time.
 #[test]
 fn a_plan_keeps_every_promise_or_is_not_found() {
     let with = |a: &str, more: &str| {
@@ -251,7 +251,8 @@ fn a_plan_keeps_every_promise_or_is_not_found() {
         let report: Value = serde_json::from_str(&report).expect("JSON");
         (report["backup_plan"].clone(), workshop.punctual(words).stdout)
     };
-    // Ample bounds: a plan, and a sooner one. At rest past the deadline, within the bounds.
+    // Ample bounds: there is a plan, even for an earlier deadline. It is at rest after the deadline, within
+    // the bounds.
     let (backup_plan, text) = with("8.0", "");
     assert!(
         text.contains("backup plan: found; within the bounds, it keeps every promise, whatever u_ref is\n"),
@@ -263,8 +264,8 @@ fn a_plan_keeps_every_promise_or_is_not_found() {
     let plan = &backup_plan["plan"];
     assert!(plan["at_equilibrium_from"].as_f64() > Some(10.0), "{backup_plan}");
     assert!(plan["inputs"][0][1].as_f64().is_some_and(|peak| 0.0 < peak && peak <= 8.0), "{backup_plan}");
-    // At 0.8 m/s² the edge, 61.6 m away, is passed after 12.4 s at the earliest, after 14.95 s by who stops straight ahead inside, and
-    // sooner by who turns there.
+    // At 0.8 m/s² the edge, 61.6 m away, is passed after 12.4 s at the earliest. Stopping inside straight
+    // ahead takes 14.95 s; turning inside is faster.
     let (backup_plan, text) = with("0.8", "");
     assert!(
         text.contains("backup plan: NONE was found: in the closest attempt, goal is not met at "),
@@ -277,7 +278,7 @@ fn a_plan_keeps_every_promise_or_is_not_found() {
         earliest.zip(factor(&backup_plan)).is_some_and(|(s, f)| (s - 10.0 * f).abs() < 1e-9),
         "{backup_plan}"
     );
-    // What no plan accounts for is said.
+    // What plans do not support is reported.
     let (backup_plan, text) = with("8.0", "\ndisturbance = 0.1 #");
     let reason = "goal.disturbance is 0.1, must be 0 for a plan";
     assert_eq!(
@@ -288,8 +289,8 @@ fn a_plan_keeps_every_promise_or_is_not_found() {
     assert!(text.contains(&format!("backup plan: NONE was found: {reason}\n")), "{text}");
 }
 
-/// A filter that follows plans and finds none promises nothing, although its rows keep the set from there: the code shows it,
-/// and later deadlines that nobody has asked for are not spoken of.
+/// A filter that follows plans and finds none promises nothing, although its rows would keep the set from
+/// there. The exit code shows it, and later deadlines, which nobody asked for, are not mentioned.
 #[test]
 fn a_start_without_a_plan_is_code_one() {
     let workshop = Workshop::new();
@@ -314,7 +315,7 @@ expression = "p + 1"
         workshop.write("floor.toml", text);
         workshop.punctual(["check", "floor.toml"])
     };
-    // It gathers speed for ever, away from the floor.
+    // It accelerates forever, away from the floor.
     let done = written(0.5);
     assert_eq!(done.code, 1, "{done:#?}");
     assert!(
@@ -326,7 +327,7 @@ expression = "p + 1"
     assert_eq!(done.code, 0, "{done:#?}");
 }
 
-/// A filter for a point mass with these barriers, and what stands before them.
+/// A filter for a point mass with these barriers, and `before` as the text before them.
 fn point_mass(before: &str, barriers: &str) -> String {
     format!(
         r#"kind = "filter"
@@ -345,7 +346,8 @@ fn disc(name: &str, shape: &str, [x, y]: [f64; 2], radius: f64, more: &str) -> S
 
 const BOUNDS: &str = "bounds = { u_x = [-2.0, 2.0], u_y = [-2.0, 2.0] }\nx0 = { v_x = 0.0 }";
 
-/// Deadlines that are tried lie within the time of their barrier: what `run` takes is judged, and no number is of our own making.
+/// The deadlines tried lie within the time of their barrier: `check` judges whatever `run` accepts, and
+/// invents no numbers.
 #[test]
 fn a_barrier_that_begins_later_or_ends_is_judged() {
     let workshop = Workshop::new();
@@ -378,8 +380,8 @@ fn a_barrier_that_begins_later_or_ends_is_judged() {
     }
 }
 
-/// A gap of 90 m of which the car feels nothing yet: the rate is the one that acts, and a earliest deadline is no later than
-/// the arrival beside it.
+/// A gap of 90 m that does not affect the car yet: the rate shown is the one in force, and an earliest
+/// deadline is no later than the arrival shown with it.
 #[test]
 fn what_check_says_is_what_acts() {
     let workshop = Workshop::new();
@@ -394,7 +396,7 @@ derivatives = { v = "a", z = "15 - v" }"#;
     let gap = "[[barrier]]\nname = \"gap\"\nexpression = \"z - 10\"\nunit = \"m\"";
     workshop.write("gap.toml", expressions("v = 20.0, z = 100.0", 0.1, car, gap).replace("300.0", "20.0"));
     let text = workshop.punctual(["check", "gap.toml"]).success();
-    // Half of the 4 m/s2, over 90 m.
+    // Half of the 4 m/s2, divided by 90 m.
     let wanted = "  rate             0.1491 1/s at the start, chosen at every sample\n";
     assert!(text.contains(wanted), "{text}");
     let glucose = r#"states = [{ name = "G" }, { name = "X" }, { name = "I" }]
@@ -412,7 +414,7 @@ derivatives = { G = "-0.0317*(G-81)-X*G", X = "-0.0123*X+0.00000492*(I-7)", I = 
     assert_eq!(report["warnings"].as_array().map(Vec::len), Some(0), "{report}");
 }
 
-/// The plant to simulate and its u_ref are those of the file, or it is said that they are not.
+/// The plant to simulate and its u_ref are those of the file, or `check` says that they are not.
 #[test]
 fn a_plant_to_simulate_is_simulated_or_it_is_said() {
     let workshop = Workshop::new();
@@ -423,21 +425,22 @@ fn a_plant_to_simulate_is_simulated_or_it_is_said() {
 inputs = [{ name = "u_x" }, { name = "u_y" }]
 derivatives = { x_p = "v_x", y_p = "v_y", v_x = "u_x - 0.5", v_y = "u_y" }"#;
     workshop.write("alike.toml", simulated(alike));
-    let told = workshop.punctual(["check", "alike.toml"]).stdout;
-    assert!(told.contains("closed loop with the u_ref of the file"), "{told}");
-    assert!(told.contains("warning: the closed loop has the plant in `simulated`"), "{told}");
+    let printed = workshop.punctual(["check", "alike.toml"]).stdout;
+    assert!(printed.contains("closed loop with the u_ref of the file"), "{printed}");
+    assert!(printed.contains("warning: the closed loop has the plant in `simulated`"), "{printed}");
     let lagged = alike
         .replace("{ name = \"v_y\" }", "{ name = \"v_y\" }, { name = \"w\" }")
         .replace("v_y = \"u_y\"", "v_y = \"w\", w = \"10*(u_y - w)\"");
     workshop.write("lagged.toml", simulated(&lagged));
-    let told = workshop.punctual(["check", "lagged.toml"]).stdout;
+    let printed = workshop.punctual(["check", "lagged.toml"]).stdout;
     assert!(
-        told.contains("since `simulated` has other states or inputs, and not the file's u_ref"),
-        "{told}"
+        printed.contains("since `simulated` has other states or inputs, and not the file's u_ref"),
+        "{printed}"
     );
 }
 
-/// What geometry rules out is refused without a search, by the names and numbers of the sets; what is possible is not.
+/// What geometry rules out is refused without a search, with the names and numbers of the sets; what is
+/// possible is not refused.
 #[test]
 fn sets_that_are_apart_are_refused_by_name() {
     let workshop = Workshop::new();
@@ -454,7 +457,7 @@ fn sets_that_are_apart_are_refused_by_name() {
     workshop.punctual(["check", "filter.toml"]);
     let run = workshop.punctual(["run", "filter.toml"]);
     assert!(format!("{}{}", run.stdout, run.stderr).contains(within), "{run:#?}");
-    // A part of the goal is free; the rock is gone by then; moves; or yields.
+    // Part of the goal is free; the rock is released by then; it moves; or it is soft.
     for barriers in [
         [goal("deadline = 8.0"), rock(1.4, "")],
         [goal("deadline = 8.0"), rock(2.0, "end = 7.0")],
@@ -464,7 +467,7 @@ fn sets_that_are_apart_are_refused_by_name() {
         let said = reason(BOUNDS, &barriers);
         assert!(!said.contains("lies wholly inside"), "{barriers:?}: {said}");
     }
-    // A home that contains the start is to be kept from there on.
+    // A home that contains the start must be kept from there on.
     let home = disc("home", "disc", [0.0, 0.0], 2.0, "deadline = 12.0");
     let said = reason(
         BOUNDS,
@@ -472,25 +475,25 @@ fn sets_that_are_apart_are_refused_by_name() {
     );
     let wanted = "home and pickup are 5 m apart: no state is in both; and home contains the start, so that it is to be kept from there on: did you mean `begin`?";
     assert_eq!(said, wanted);
-    // Bounds of a point.
+    // Bounds that fix the input.
     let fixed = "bounds = { u_x = [0.0, 0.0], u_y = [0.0, 0.0] }\nx0 = { v_x = 1.0 }";
     let said = reason(fixed, &[goal("deadline = 8.0")]);
     let wanted = "the bounds fix every input (u_x = 0, u_y = 0), so that nothing can steer the plant; in the closest attempt, goal is not met at ";
     assert!(said.starts_with(wanted), "{said}");
 }
 
-/// What `check` knows of a filter, a run of its file says too.
+/// Whatever `check` knows about a filter, a run of its file reports too.
 #[test]
 fn a_run_says_what_check_knows() {
     let workshop = Workshop::new();
-    let told = |barriers: &str| {
+    let printed = |barriers: &str| {
         workshop.write("filter.toml", point_mass(BOUNDS, barriers));
         let done = workshop.punctual(["run", "filter.toml"]);
         format!("{}{}", done.stdout, done.stderr)
     };
-    let soon = told(&disc("goal", "disc", [30.0, 0.0], 1.0, "deadline = 4.0"));
+    let soon = printed(&disc("goal", "disc", [30.0, 0.0], 1.0, "deadline = 4.0"));
     assert!(soon.contains("earliest deadline with a plan: goal "), "{soon}");
-    let root = told(&disc(
+    let root = printed(&disc(
         "goal",
         "quadratic_disc",
         [10.0, 0.0],
@@ -502,7 +505,8 @@ fn a_run_says_what_check_knows() {
     assert!(root.contains(&format!("note: goal: {warning}")), "{warning}: {root}");
 }
 
-/// A turn moves the place only where there is a speed. The row on the speed is right, but no row limits the turn: it needs bounds.
+/// Turning changes the position only at nonzero speed. The row on the speed is right, but no row limits the
+/// turn, so it needs bounds.
 #[test]
 fn an_input_that_enters_later_needs_bounds() {
     let workshop = Workshop::new();
@@ -541,7 +545,7 @@ expression = "(x - 10)^2 + (y - 0.1)^2 - 1"
     assert!(planned.code == 0 && planned.stdout.contains("guaranteed"), "{planned:#?}");
 }
 
-/// Rocks: the place of each, and its radius.
+/// Rocks: the position of each, and its radius.
 const FOREST: [(f64, f64, f64); 25] = [
     (16.275, -9.524, 0.838),
     (12.059, -10.404, 0.841),
@@ -570,8 +574,8 @@ const FOREST: [(f64, f64, f64); 25] = [
     (54.497, 11.083, 1.001),
 ];
 
-/// A way through is found for each of the deadlines: what is missing is told to the search by its size, and not by what a long
-/// piece of the way leaves open.
+/// A plan is found for each of the deadlines, since the search measures what is missing directly, and not by
+/// what a long piece of the trajectory leaves undecided.
 #[test]
 fn a_forest_is_promised_at_later_deadlines_too() {
     let workshop = Workshop::new();

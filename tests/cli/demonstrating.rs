@@ -1,11 +1,12 @@
-//! `punctual demo`: the numbers that it promises and the files that it leaves. (The README has its output.)
+//! `punctual demo`: the numbers that it promises and the files that it writes. (The README has its output.)
 
 use serde_json::Value;
 
 use crate::table::Table;
 use crate::workshop::Workshop;
 
-/// The run of a vehicle among bounds: it begins the wrong way, keeps its distance from the rock and within the bounds.
+/// The run of a vehicle with bounds: it begins in the wrong direction, avoids the rock and stays within the
+/// bounds.
 fn hindered(workshop: &Workshop, model: &str, run: &Value) {
     let bounds = match model {
         "point_mass" => [5.0, 5.0],
@@ -40,7 +41,7 @@ fn the_demonstration_keeps_its_promise_and_leaves_everything_behind() {
     for run in runs {
         let (model, method) =
             (run["model"].as_str().expect("a name"), run["method"].as_str().expect("a name"));
-        // The paper's method arrives late by what its table says; ours on time, to stay.
+        // The paper's method arrives late by the time in its table; ours is on time and stays.
         assert_eq!(run["kept"], method != "repeated_root", "{run}");
         if method == "plans" {
             hindered(&workshop, model, run);
@@ -62,7 +63,7 @@ fn the_demonstration_keeps_its_promise_and_leaves_everything_behind() {
         files.filter(|e| e.as_ref().is_ok_and(|e| e.path().extension().is_some_and(|x| x == "svg")));
     assert!(pictures.count() >= 3, "a picture for each model");
 
-    // Its files can be run again by hand, and give the same.
+    // Its files can be run again by hand, with the same result.
     workshop.punctual(["run", "demo/unicycle-reference_profile.toml", "--out", "again"]).success();
     let file = "unicycle-reference_profile.csv";
     assert!(workshop.bytes(&format!("again/{file}")) == workshop.bytes(&format!("demo/{file}")));

@@ -1,26 +1,26 @@
-//! What fails under `--json`: one object on stdout, the words on stderr and the exit code as without it.
+//! Failures under `--json`: one object on stdout, and on stderr the same message and exit code as without it.
 
 use serde_json::{Value, json};
 
 use crate::workshop::{Workshop, examples};
 
-/// Runs a command that fails, without `--json` and with it; returns the error that it prints.
+/// Runs a failing command without `--json` and with it; returns the error object.
 #[track_caller]
 fn failure(workshop: &Workshop, arguments: &[&str]) -> Value {
     let plain = workshop.punctual(arguments);
-    let told = workshop.punctual(arguments.iter().chain(&["--json"]));
-    assert_eq!((plain.code, plain.stdout.as_str()), (told.code, ""), "{arguments:?}");
-    // The usage that clap prints has the options that were given.
-    assert_eq!(plain.stderr, told.stderr.replace(" --json", ""), "{arguments:?}");
+    let with_json = workshop.punctual(arguments.iter().chain(&["--json"]));
+    assert_eq!((plain.code, plain.stdout.as_str()), (with_json.code, ""), "{arguments:?}");
+    // The usage that clap prints includes the options that were given.
+    assert_eq!(plain.stderr, with_json.stderr.replace(" --json", ""), "{arguments:?}");
     let printed: Value =
-        serde_json::from_str(&told.stdout).unwrap_or_else(|e| panic!("{e}: {}", told.stdout));
+        serde_json::from_str(&with_json.stdout).unwrap_or_else(|e| panic!("{e}: {}", with_json.stdout));
     let object = printed.as_object().expect("an object");
     assert_eq!(object.len(), 1, "{printed}");
     let error = object["error"].clone();
-    assert_eq!(error["code"], told.code, "{error}");
-    // What stands in the parts stands on stderr.
+    assert_eq!(error["code"], with_json.code, "{error}");
+    // What the parts say is also on stderr.
     for part in ["file", "component", "field"].iter().filter_map(|part| error[*part].as_str()) {
-        assert!(told.stderr.contains(part), "{part} in {}", told.stderr);
+        assert!(with_json.stderr.contains(part), "{part} in {}", with_json.stderr);
     }
     error
 }
@@ -69,7 +69,7 @@ fn files_and_fmus_are_told() {
         (&error["kind"], &error["file"], &error["code"]),
         (&"fmu".into(), &"bad.fmu".into(), &1.into())
     );
-    // Of a system, with the component.
+    // In a system, the component is given.
     workshop.write("plant.toml", std::fs::read(examples().join("unicycle-plant.toml")).expect("an example"));
     workshop.write(
         "system.toml",
@@ -90,12 +90,12 @@ fn options_and_usage_are_told() {
     let error = failure(&workshop, &["run", "system.toml", "--report"]);
     let wanted = json!({ "kind": "configuration", "code": 2, "field": "--report", "message": "needs a folder for its page; add --out DIR" });
     assert_eq!(error, wanted);
-    // The words of clap, which it gives stderr too.
+    // Clap's message, which stderr also gets.
     let error = failure(&workshop, &["replay", "c.parquet"]);
     assert_eq!((&error["kind"], &error["code"]), (&"usage".into(), &2.into()));
     let message = error["message"].as_str().expect("a message");
     assert!(message.starts_with("the following required") && message.contains("--run <N>"), "{message}");
-    // Help is no failure.
+    // Help is not a failure.
     let help = workshop.punctual(["run", "--json", "--help"]).success();
     assert!(help.starts_with("Simulate a filter's file"), "{help}");
 }

@@ -1,5 +1,6 @@
-//! `punctual inspect` and `punctual validate` on FMUs of FMI 3.0: a sound one with every kind of variable, and defects one
-//! at a time. Nothing is run here; FMPy's verdicts are compared in `tests/interop/test_verdicts3.py`.
+//! `punctual inspect` and `punctual validate` on FMUs of FMI 3.0: a sound one with every kind of variable,
+//! and one defect at a time. Nothing is run here; the verdicts are compared with FMPy's in
+//! `tests/interop/test_verdicts3.py`.
 
 use std::fs;
 use std::path::Path;
@@ -20,7 +21,7 @@ fn fixture(name: &str) -> String {
     fs::read_to_string(path).expect("the fixture")
 }
 
-/// Writes `x.fmu` with the fixtures and source code, one text of one entry replaced, which must be there.
+/// Writes `x.fmu` with the fixtures and source code, after replacing one text of one entry, which must occur.
 fn write(workshop: &Workshop, entry: &str, from: &str, to: &str) {
     let mut archive = Archive::new();
     for (name, text) in [
@@ -36,7 +37,7 @@ fn write(workshop: &Workshop, entry: &str, from: &str, to: &str) {
     workshop.write("x.fmu", archive.to_bytes().expect("an archive"));
 }
 
-/// The findings on the edited FMU, but for the one that there is no library.
+/// The findings on the edited FMU, except the missing library.
 fn findings(entry: &str, from: &str, to: &str) -> Vec<String> {
     let workshop = Workshop::new();
     write(&workshop, entry, from, to);

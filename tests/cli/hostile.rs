@@ -1,4 +1,4 @@
-//! Files made to do harm, given to every command that opens FMUs: refused with a clear message, within
+//! Malicious files, given to every command that opens FMUs. They are refused with a clear message, within
 //! bounded time and memory, before anything is unpacked.
 
 use std::io::{Cursor, Write};
@@ -12,9 +12,9 @@ use crate::misbehaving::{self, description};
 use crate::validating::findings;
 use crate::workshop::{Done, Workshop};
 
-/// Longest time of a refusal, on a loaded machine.
+/// The longest time that a refusal may take on a loaded machine.
 const PATIENCE: Duration = Duration::from_secs(30);
-/// Address space that the commands may take, in KiB.
+/// Address space available to the commands, in KiB.
 const MEMORY: u32 = 2 << 20;
 
 fn archive(entries: &[(&str, &[u8])]) -> Vec<u8> {
@@ -26,7 +26,7 @@ fn archive(entries: &[(&str, &[u8])]) -> Vec<u8> {
     zip.finish().expect("an archive").into_inner()
 }
 
-/// The bytes with every `from` made `to`, which is as long.
+/// The bytes with every `from` replaced by `to`, which has the same length.
 fn patched(bytes: &[u8], from: &[u8], to: &[u8]) -> Vec<u8> {
     assert_eq!(from.len(), to.len());
     let mut bytes = bytes.to_vec();
@@ -38,7 +38,7 @@ fn patched(bytes: &[u8], from: &[u8], to: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Runs the command with bounded memory.
+/// Runs the command with limited memory.
 fn punctual(workshop: &Workshop, arguments: &[&str]) -> Done {
     let mut command = Command::new("sh");
     command.args(["-c", &format!("ulimit -v {MEMORY}; exec \"$0\" \"$@\""), env!("CARGO_BIN_EXE_punctual")]);
@@ -54,7 +54,7 @@ fn punctual(workshop: &Workshop, arguments: &[&str]) -> Done {
     }
 }
 
-/// Asserts that all commands refuse the file with this rule and message (a part of it).
+/// Asserts that all commands refuse the file with this rule and a message that contains `message`.
 #[track_caller]
 fn refused(fmu: &[u8], rule: &str, message: &str) {
     let workshop = Workshop::new();
@@ -88,7 +88,7 @@ fn refused(fmu: &[u8], rule: &str, message: &str) {
     );
 }
 
-/// The archive with this model description and nothing else.
+/// The same for an archive with only this model description.
 #[track_caller]
 fn refused_xml(xml: &[u8], message: &str) {
     refused(&archive(&[("modelDescription.xml", xml)]), "xml.readable", message);
@@ -278,7 +278,7 @@ fn entities_that_expand() {
 
 #[test]
 fn a_description_without_end() {
-    // Names that differ do not compress enough to count as a bomb.
+    // Different names compress too little to count as a bomb.
     let mut xml = "<fmiModelDescription>".to_owned();
     let mut state = 1_u64;
     while xml.len() <= 64 << 20 {
@@ -291,7 +291,7 @@ fn a_description_without_end() {
     refused(&fmu, "archive.limit", "bytes; allowed are at most 67108864");
 }
 
-/// Many variables are no defect: they are read, in bounded time, and findings are cut short.
+/// Many variables are not a defect: they are read in bounded time, and the findings are limited.
 #[test]
 fn variables_without_number() {
     let variables: String = (10..100_010)
@@ -320,7 +320,7 @@ fn another_encoding_than_is_declared() {
     let latin = "warning xml.encoding modelDescription.xml:1: the declared encoding is \"ISO-8859-1\", which not every importer \
                  reads; should be UTF-8";
     assert_eq!(findings(declared("ISO-8859-1")), [latin]);
-    // A byte that is no UTF-8: an umlaut where the declaration says so, else damage.
+    // A byte that is not UTF-8: an umlaut if the declaration says so, else damage.
     let with_byte = |text: String| {
         let mut bytes = text.into_bytes();
         let at = bytes.windows(6).position(|w| w == b"logAll").expect("the category");

@@ -1,4 +1,4 @@
-//! Pages for a browser, taken apart.
+//! Parses pages for a browser.
 
 use serde_json::Value;
 

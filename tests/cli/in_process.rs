@@ -1,10 +1,11 @@
-//! `punctual run` equals the core in process, bit for bit: going through files, FMI and a shared
-//! library changes nothing.
+//! `punctual run` equals the core in process, bit for bit: files, FMI and a shared library in between change
+//! nothing.
 //!
-//! The loop below is [`punctual_reference::simulation::closed_loop`] with one difference, the time of a sample.
-//! `closed_loop` samples at k·h. The master steps from the same k·h, but an instance goes on from the end of its
-//! last step, (k−1)·h + h, as long as the two differ by round-off only. So its time never runs backwards under a
-//! master that counts otherwise. The filter's profile is a function of that time, so the last bits depend on it.
+//! The loop below is [`punctual_reference::simulation::closed_loop`] with one difference, the time of a
+//! sample. `closed_loop` samples at k·h. The master steps from the same k·h, but an instance continues from
+//! the end of its last step, (k−1)·h + h, as long as the two differ only by round-off. So its time never runs
+//! backwards with a master that counts differently. The filter's profile is a function of that time, so the
+//! last bits depend on it.
 
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::rk4_step;
@@ -18,7 +19,7 @@ use crate::table::{Table, assert_same_bits};
 const STEP: f64 = 0.001;
 const STEPS: usize = 3000;
 
-/// The instants from which the filter's input acts.
+/// From when the filter's input acts.
 #[derive(Clone, Copy, PartialEq)]
 enum Order {
     /// From the sample on.
@@ -56,8 +57,8 @@ fn in_process(order: Order) -> Rows {
     let mut filter = filter();
     let mut rows = Rows::default();
     let mut x = [0.0; 4];
-    // The last result of the filter, and h of that sample. In Jacobi order these are still read when the plant is
-    // at the next point. Before the first step both are a look at the start.
+    // The last result of the filter, and h of that sample. In Jacobi order these are still read when the
+    // plant is at the next point. Before the first step, both come from looking ahead at the start.
     let mut last = [0.0; 2];
     let mut sample = |time: f64, x: &[f64; 4]| {
         // The nominal controller: damping, a = −v.
@@ -69,7 +70,7 @@ fn in_process(order: Order) -> Rows {
     let mut time = 0.0;
     let mut last_h = 0.0;
     for k in 0..=STEPS {
-        // At the stop time nothing steps any more: in Jacobi order that sample is never taken.
+        // No step begins at the stop time, so in Jacobi order that sample is never taken.
         let (u, h) = if order == Order::Jacobi && k == STEPS { (last, last_h) } else { sample(time, &x) };
         if k == 0 || order == Order::GaussSeidel {
             (last, last_h) = (u, h);

@@ -1,4 +1,4 @@
-//! `punctual inspect`: the text, the JSON, and FMUs that break the standard.
+//! `punctual inspect`: the text, the JSON, and FMUs that violate the standard.
 
 use serde_json::Value;
 
@@ -10,7 +10,7 @@ fn the_text_of_filter_and_plant() {
     let workshop = Workshop::with_fmus();
     for name in ["filter", "plant"] {
         let text = workshop.punctual(["inspect", &format!("{name}.fmu")]).success();
-        // The test does not depend on the version and the platform.
+        // The test must not depend on the version and the platform.
         let text = text.replace(env!("CARGO_PKG_VERSION"), "VERSION");
         let text = text.replace(punctual_cosim::host::PLATFORM, "PLATFORM");
         assert_golden(&format!("inspect-{name}.txt"), &without_guids(&text));

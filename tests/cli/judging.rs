@@ -1,5 +1,5 @@
-//! Verdicts of `run` and `check` on a promise, against h itself: late between two samples, left, kept with steps
-//! that were not met, nothing promised, a start that only looks good.
+//! Verdicts of `run` and `check` on a promise, compared with h itself: late between two samples, left, kept
+//! although some steps were not met, nothing promised, a start that only looks good.
 
 use serde_json::Value;
 
@@ -47,14 +47,14 @@ impl Case<'_> {
     }
 }
 
-/// Code and report of `run --json` with a requirement.
+/// Exit code and report of `run --json` with a requirement.
 fn run(workshop: &Workshop, require: &str) -> (i32, Value) {
     let words = ["run", "system.toml", "--out", "out", "--json", "--require", require];
     let done = workshop.punctual(words);
     (done.code, serde_json::from_str(&done.stdout).expect("JSON"))
 }
 
-/// Code and report of `check --json` from the start of the plant.
+/// Exit code and report of `check --json` from the start of the plant.
 fn check(workshop: &Workshop, more: &[&str]) -> (i32, Value) {
     let words = ["check", "filter.toml", "--plant", "plant.toml", "--json"];
     let done = workshop.punctual(words.iter().chain(more));
@@ -66,7 +66,7 @@ const INTEGRATOR: &str = "[plant]\nstates = [{ name = \"p\", unit = \"m\" }]\n\
 const CART: &str = "[plant]\nstates = [{ name = \"p\", unit = \"m\" }, { name = \"v\", unit = \"m/s\" }]\n\
                     inputs = [{ name = \"a\", unit = \"m/s2\" }]\nderivatives = { p = \"v\", v = \"a\" }";
 
-/// An integrator under held inputs goes along straight lines, so that its rows give h at the deadline.
+/// With held inputs an integrator moves along straight lines, so that its rows determine h at the deadline.
 #[test]
 fn a_deadline_between_two_samples_is_judged_by_h_there() {
     for (distance, deadline, step) in
@@ -98,7 +98,7 @@ fn a_deadline_between_two_samples_is_judged_by_h_there() {
     }
 }
 
-/// The example's car follows at 80 m without a headway: no deadline limits the time at which it brakes.
+/// The example's car follows at 80 m without a headway: no deadline determines when it brakes.
 #[test]
 fn an_obstacle_is_kept_without_a_deadline() {
     let plant = "[plant]\nstates = [{ name = \"gap\", unit = \"m\" }, { name = \"v\", unit = \"m/s\" }]\n\
@@ -140,16 +140,17 @@ fn outside_without_a_deadline_nothing_is_promised() {
             "side: outside at the start and without a deadline: nothing is promised; give it a deadline";
         let done = workshop.punctual(["check", "filter.toml", "--plant", "plant.toml"]);
         assert!(done.code == 1 && done.stdout.contains(&format!("warning: {words}")), "{done:#?}");
-        let told = words.replace("side:", "filter.side:");
+        let printed = words.replace("side:", "filter.side:");
         for (require, code) in [("kept", 1), ("on_time_and_inside", 1)] {
             let done = workshop.punctual(["run", "system.toml", "--require", require]);
-            assert!(done.code == code && done.stderr.contains(&told), "{done:#?}");
+            assert!(done.code == code && done.stderr.contains(&printed), "{done:#?}");
             assert!(done.stdout.contains("nothing promised"), "{done:#?}");
         }
     }
 }
 
-/// Brakes that are too weak: inside at the start, left, and so not kept; the constraint is told apart.
+/// Brakes that are too weak: inside at the start, left, and so not kept. The constraint is reported
+/// separately.
 #[test]
 fn what_began_inside_and_is_left_is_not_kept() {
     for (v, deadline) in [(5.0, ""), (3.0, ""), (5.0, "\ndeadline = 1.0")] {
@@ -177,10 +178,10 @@ fn what_began_inside_and_is_left_is_not_kept() {
     }
 }
 
-/// On time and inside with steps that were not met: the promise is kept, the constraint is not.
+/// On time and inside although some steps were not met: the promise is kept, the constraint is not.
 #[test]
 fn promise_and_constraint_are_told_apart() {
-    // From rest 20 m in 5 s: at least 0.8 d·4/T², and the profile asks for a peak of 6d/T².
+    // 20 m from rest in 5 s needs at least 0.8 d·4/T², and the profile has a peak of 6d/T².
     let filter = "assurance = \"off\"\nbounds = { a = [-4.0, 4.0] }";
     let barriers = "[[barrier]]\nname = \"goal\"\nexpression = \"p - 20\"\n\
                     unit = \"m\"\ndeadline = 5.0";
@@ -230,7 +231,8 @@ fn a_margin_that_h_never_has_is_refused() {
     }
 }
 
-/// The verdict of `check` on a start is that of `run` with the same u_ref: code 0 only where the promise is kept.
+/// The verdict of `check` on a start is that of `run` with the same u_ref: exit code 0 only if the promise is
+/// kept.
 #[test]
 fn check_says_what_a_run_does() {
     let goal = |centre: [f64; 2], more: &str| {
@@ -259,15 +261,16 @@ fn check_says_what_a_run_does() {
         assert!(text.contains("closed loop with u_ref = 0 (--u-ref none)"), "{text}");
         assert!(kept || !text.contains("and the closed loop keeps it\n"), "{text}");
         let notes = ran["notes"].as_array().expect("a list");
-        let told =
+        let printed =
             |note: &Value| note.as_str().is_some_and(|n| n.contains("nothing feeds u_ref.u_x, u_ref.u_y"));
-        assert!(notes.iter().any(told), "{ran}");
+        assert!(notes.iter().any(printed), "{ran}");
         let (_, damped) = check(&workshop, &["--u-ref", "damping"]);
         assert_eq!(damped["closed_loop"]["u_ref"], "damping as u_ref (--u-ref damping)");
     }
 }
 
-/// A pole on a cart: the cart has to be somewhere, the pole upright, and one force does not do both for long by the rows.
+/// A pole on a cart: the cart must be at a place, the pole upright, and with one force the rows cannot do
+/// both for long.
 #[test]
 fn what_runs_away_is_not_promised() {
     let plant = "[plant]\nstates = [{ name = \"p\", unit = \"m\" }, { name = \"v\", unit = \"m/s\" }, \
@@ -297,7 +300,7 @@ fn what_runs_away_is_not_promised() {
     assert_eq!((code, ended), (0, 0), "{checked} and {ran}");
 }
 
-/// Without bounds `check` tells the input needed. Constants are a u_ref too; other texts are refused.
+/// Without bounds `check` reports the input needed. Constants can be a u_ref too; other texts are refused.
 #[test]
 fn the_wanted_input_of_a_check() {
     let barriers = "[[barrier]]\nname = \"goal\"\nexpression = \"p - 20\"\nunit = \"m\"\ndeadline = 5.0";

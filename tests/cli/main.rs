@@ -1,6 +1,6 @@
-//! The command line as its users meet it: arguments and files in, exit code, stdout, stderr and
-//! files out. Texts that are stable are kept in `golden/`; run with `PUNCTUAL_UPDATE_GOLDEN=1` to
-//! rewrite them, and read the difference before committing it.
+//! The command line as users see it: arguments and files in, exit code, stdout, stderr and files out. Texts
+//! that are stable are kept in `golden/`; run with `PUNCTUAL_UPDATE_GOLDEN=1` to rewrite them, and read the
+//! difference before committing it.
 
 mod alone;
 mod arming;

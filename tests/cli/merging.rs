@@ -1,5 +1,5 @@
-//! `punctual merge`: the product, and everything that is refused. The second platform is made here: the FMU with
-//! its library in another folder, as one built there would be.
+//! `punctual merge`: the merged FMU, and everything that is refused. The second platform is simulated: the
+//! FMU with its library in another folder, as if it had been built there.
 
 use std::collections::BTreeMap;
 use std::io::{Cursor, Write};
@@ -12,7 +12,7 @@ use zip::write::SimpleFileOptions;
 use crate::misbehaving::{self, description};
 use crate::workshop::{Workshop, assert_golden, without_guids};
 
-/// The platform of the second FMU: its libraries have the format of Linux.
+/// The platform of the second FMU, whose libraries have the format of Linux.
 const OTHER: &str = "aarch64-linux";
 
 pub(crate) type Entries = BTreeMap<String, Vec<u8>>;
@@ -27,7 +27,7 @@ pub(crate) fn entries(workshop: &Workshop, name: &str) -> Entries {
     entries
 }
 
-/// Writes an FMU of these entries.
+/// Writes an FMU with these entries.
 pub(crate) fn write(workshop: &Workshop, name: &str, entries: &Entries) {
     let mut archive = Archive::new();
     for (entry, bytes) in entries {
@@ -49,7 +49,7 @@ pub(crate) fn elsewhere(entries: &Entries, platform: &str, edit: impl Fn(&mut Ve
     moved.collect()
 }
 
-/// Makes an ELF library one of [`OTHER`]: the processor stands in bytes 18 and 19.
+/// Turns an ELF library into one of [`OTHER`]: the processor is in bytes 18 and 19.
 pub(crate) fn for_other_processor(library: &mut [u8]) {
     assert!(library.starts_with(b"\x7fELF"), "this test makes a library of Linux one for another processor");
     library[18..20].copy_from_slice(&[183, 0]);
@@ -69,16 +69,16 @@ fn two_systems_become_one() {
     let workshop = two_systems();
     let done = workshop.punctual(["merge", "here.fmu", "there.fmu", "-o", "both.fmu"]);
     assert_eq!(done.stderr, "");
-    let told =
+    let printed =
         format!("both.fmu: unicycle_filter for {OTHER} (there.fmu), {PLATFORM} (here.fmu), guid {{GUID}}\n");
-    assert_eq!(without_guids(&done.success()), told);
+    assert_eq!(without_guids(&done.success()), printed);
     let (here, there) = (entries(&workshop, "here.fmu"), entries(&workshop, "there.fmu"));
     assert_eq!((here.len(), there.len()), (6, 6));
     let mut union = here.clone();
     union.extend(there);
     assert_eq!(union.len(), 7);
     assert!(entries(&workshop, "both.fmu") == union, "not the entries of both");
-    // The product is sound for other commands, and no temporary file is left.
+    // Other commands accept the merged FMU, and no temporary file is left.
     assert_eq!(workshop.punctual(["validate", "both.fmu"]).success(), "both.fmu: no errors, no warnings\n");
     assert_eq!(workshop.files(), ["both.fmu", "filter.fmu", "here.fmu", "plant.fmu", "there.fmu"]);
 }
@@ -96,7 +96,7 @@ fn neither_order_nor_repetition_changes_a_byte() {
         both == merge(&["both.fmu", "there.fmu", "here.fmu"], "again.fmu"),
         "what is there already shows"
     );
-    // The product may take the place of one of the files.
+    // The merged FMU may replace one of the files.
     assert!(both == merge(&["here.fmu", "there.fmu"], "here.fmu"), "the name of the product shows");
     assert!(workshop.bytes("filter.fmu") == merge(&["filter.fmu", "filter.fmu"], "same.fmu"));
 }
@@ -127,11 +127,11 @@ fn what_is_told_as_json() {
          note: `punctual validate both.fmu` finds errors (1)\n"
     );
     assert_eq!(done.stderr, notes);
-    let told = without_guids(&done.success());
-    assert_golden("merge.json", &told.replace(&format!("library for {PLATFORM}"), "library for PLATFORM"));
+    let printed = without_guids(&done.success());
+    assert_golden("merge.json", &printed.replace(&format!("library for {PLATFORM}"), "library for PLATFORM"));
 }
 
-/// An FMU of another tool, which says when it was written, in the manner of its system.
+/// FMUs of another tool that contain the time of writing, in the style of each system.
 #[test]
 fn fmus_of_others_may_say_when_they_were_written() {
     let workshop = Workshop::new();
@@ -144,21 +144,21 @@ fn fmus_of_others_may_say_when_they_were_written() {
     write(&workshop, "b.fmu", &b);
     for files in [["a.fmu", "b.fmu"], ["b.fmu", "a.fmu"]] {
         let done = workshop.punctual(["merge", files[0], files[1], "-o", "both.fmu"]);
-        let told = format!("both.fmu: misbehaving for {PLATFORM} (a.fmu), win64 (b.fmu), guid none\n");
-        assert_eq!(done.success(), told);
+        let printed = format!("both.fmu: misbehaving for {PLATFORM} (a.fmu), win64 (b.fmu), guid none\n");
+        assert_eq!(done.success(), printed);
         let both = entries(&workshop, "both.fmu");
         assert!(both["modelDescription.xml"] == a["modelDescription.xml"], "not the earlier one");
         assert_eq!(both.len(), 3);
     }
 }
 
-/// One difference at a time is refused with its message, and the product's place is as before.
+/// Each single difference is refused with its message, and the output file is unchanged.
 #[test]
 fn what_differs_is_refused() {
     let workshop = Workshop::with_fmus();
     let own_library = format!("binaries/{PLATFORM}/unicycle_filter{}", std::env::consts::DLL_SUFFIX);
     let mut here = entries(&workshop, "filter.fmu");
-    // Nothing is run, so less will do for a library.
+    // Nothing is run, so a placeholder is enough for a library.
     here.insert(own_library.clone(), b"a library".to_vec());
     write(&workshop, "here.fmu", &here);
     let there = elsewhere(&here, OTHER, |bytes| bytes.push(b'!'));
@@ -201,18 +201,18 @@ fn what_differs_is_refused() {
             with(&format!("binaries/{OTHER}/unicycle_filter{}", std::env::consts::DLL_SUFFIX), None),
         ),
     ];
-    let mut told = String::new();
+    let mut printed = String::new();
     for (what, entries) in cases {
         write(&workshop, "other.fmu", &entries);
         let done = workshop.punctual(["merge", "here.fmu", "other.fmu", "-o", "both.fmu"]);
         assert_eq!((done.code, done.stdout.as_str()), (1, ""), "{what}: {done:?}");
         assert!(!workshop.files().contains(&"both.fmu".to_owned()), "{what}");
-        told += &format!("{what}\n    {}", done.stderr);
+        printed += &format!("{what}\n    {}", done.stderr);
     }
-    let told = without_guids(&told);
+    let printed = without_guids(&printed);
     assert_golden(
         "merge-refused.txt",
-        &told.replace(PLATFORM, "PLATFORM").replace(env!("CARGO_PKG_VERSION"), "VERSION"),
+        &printed.replace(PLATFORM, "PLATFORM").replace(env!("CARGO_PKG_VERSION"), "VERSION"),
     );
 }
 
@@ -231,13 +231,13 @@ fn a_product_that_does_not_work_takes_no_place() {
          FMU crashed with signal 11 (invalid memory access)",
     );
     assert_eq!((workshop.text("both.fmu").as_str(), workshop.files().len()), ("as before", 3));
-    // A library that cannot be loaded is told by the name of the product.
+    // A library that cannot be loaded is reported with the name of the output file.
     misbehaving::write(&workshop, "a.fmu", description("crash-in-enter", &[]), &library[..4096]);
     let done = workshop.punctual(merge);
     assert_eq!(done.code, 0, "symbols are missing, so nothing is run: {done:?}");
     let skipped = format!("note: not examined: the trial: the library is not complete for {PLATFORM}\n");
     assert!(done.stderr.contains(&skipped), "{done:?}");
-    // Nothing is run if that is wanted.
+    // Nothing is run if so requested.
     misbehaving::write(&workshop, "a.fmu", description("crash-in-enter", &[]), &library);
     let done = workshop.punctual(merge.iter().chain(&["--no-trial"]));
     assert_eq!(done.stderr, "note: not examined: the trial: it was not wanted\n");
@@ -267,7 +267,7 @@ fn wrong_usage() {
     done.fails_like(1, "here.fmu: not a readable FMU archive: ", &[]);
 }
 
-/// Two names that are two files on one system are one file on another.
+/// Names that are two files on one system can be one file on another.
 #[test]
 fn names_that_differ_in_case_do_not_come_together() {
     let workshop = two_systems();

@@ -1,5 +1,5 @@
-//! The FMUs of `tests/fixtures/misbehaving.c` and, of FMI 3.0, `sundry.c`: sound but for one defect, which the GUID or
-//! the instantiation token names.
+//! The FMUs of `tests/fixtures/misbehaving.c` and, for FMI 3.0, `sundry.c`: sound except for one defect,
+//! which the GUID or the instantiation token selects.
 
 use std::collections::HashMap;
 use std::fs;
@@ -16,7 +16,7 @@ fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name)
 }
 
-/// The model description, with edits; each must touch something.
+/// The model description with edits, each of which must match.
 pub(crate) fn description(defect: &str, edits: &[(&str, &str)]) -> String {
     edited("misbehaving.xml", &[&[("guid=\"none\"", &*format!("guid=\"{defect}\""))], edits].concat())
 }
@@ -38,7 +38,7 @@ fn edited(name: &str, edits: &[(&str, &str)]) -> String {
 
 static COMPILED: Mutex<Option<HashMap<Vec<String>, Vec<u8>>>> = Mutex::new(None);
 
-/// The shared library, compiled with these macros by the system's C compiler, once.
+/// The shared library, compiled once with these macros by the system's C compiler.
 pub(crate) fn library(macros: &[&str]) -> Vec<u8> {
     compiled("misbehaving.c", macros)
 }
@@ -73,7 +73,8 @@ pub(crate) fn write(workshop: &Workshop, name: &str, xml: impl Into<Vec<u8>>, li
     put(workshop, name, xml, (&format!("{PLATFORM}/misbehaving"), library));
 }
 
-/// Writes the FMU with this description and its library at this place, without its ending, below `binaries/`.
+/// Writes the FMU with this description, and its library at this path below `binaries/`, given without
+/// extension.
 pub(crate) fn write_at(workshop: &Workshop, name: &str, xml: impl Into<Vec<u8>>, place: &str) {
     put(workshop, name, xml, (place, &library(&[])));
 }

@@ -1,17 +1,18 @@
-//! The mistakes of a first hour, each with its whole message.
+//! The typical mistakes of a first hour, each with its whole message.
 
 use std::fs;
 
 use crate::running::system;
 use crate::workshop::{Workshop, examples};
 
-/// The example by name, by expressions, its plant, and the system of these two.
+/// The example with a named model, the one with expressions, its plant, and the system that couples these
+/// two.
 fn example(name: &str) -> String {
     let place = if name.starts_with("jerk") { "../models" } else { "." };
     fs::read_to_string(examples().join(place).join(format!("{name}.toml"))).expect("an example")
 }
 
-/// The file, what is wrong in it, and the message after the file's name.
+/// The file, the mistake in it, and the message after the file's name.
 const MISTAKES: [(&str, &str, &str, &str); 38] = [
     (
         "unicycle-filter",
@@ -251,7 +252,7 @@ fn mistakes_in_a_configuration() {
             "{to:?}"
         );
     }
-    // What is no TOML at all is shown by the line, with a word on what is meant.
+    // Text that is not TOML is shown by its line, with a hint at what is meant.
     for (to, hint) in [
         ("deadline = 10,0", "; a decimal point is ."),
         ("direct_feedthrough = True", "; TOML writes true and false in small letters"),
@@ -262,7 +263,7 @@ fn mistakes_in_a_configuration() {
     }
 }
 
-/// Each file that is not what the command takes is told by what it is.
+/// For each file of the wrong kind, the message says what it is.
 #[test]
 fn files_of_another_kind() {
     let workshop = Workshop::new();
@@ -313,7 +314,7 @@ fn files_of_another_kind() {
     workshop.punctual(["check", "marked.toml"]).success();
 }
 
-/// An input that nothing feeds is refused in a run, unless a start value says that it is meant.
+/// A run refuses an input that nothing feeds, unless a start value shows that this is intended.
 #[test]
 fn inputs_that_nothing_feeds() {
     let advice = "connect what moves (`[[connection]]`, or `[[connect_by_name]]` for equal names), and give what stays the \
@@ -342,7 +343,7 @@ fn inputs_that_nothing_feeds() {
     workshop.punctual(["run", "system.toml"]).success();
 }
 
-/// In a campaign, an input that is varied has its values.
+/// In a campaign, a varied input counts as fed.
 #[test]
 fn inputs_that_a_campaign_varies() {
     let workshop = Workshop::new();
@@ -357,17 +358,17 @@ fn inputs_that_a_campaign_varies() {
     workshop.punctual(["campaign", "c.toml"]).success();
 }
 
-/// A step that is longer than the deadline is told in a run, as `check` tells it.
+/// A run reports a step that is longer than the deadline, as `check` does.
 #[test]
 fn a_step_longer_than_the_deadline() {
     let workshop = Workshop::with_fmus();
     let start = "fmu = \"filter.fmu\"\nstart = { \"goal.deadline\" = 0.5 }";
-    for (step, told) in [("1.0", true), ("0.5", false)] {
+    for (step, warned) in [("1.0", true), ("0.5", false)] {
         let text = system(&[("step = 0.001", &format!("step = {step}")), ("fmu = \"filter.fmu\"", start)]);
         workshop.write("system.toml", text);
         let done = workshop.punctual(["run", "system.toml"]);
         let note = "note: filter.goal: the deadline of 0.5 s is shorter than the step of 1 s: nothing is measured until it is \
                     over\n";
-        assert_eq!((done.code, done.stderr.contains(note)), (1, told), "{done:?}");
+        assert_eq!((done.code, done.stderr.contains(note)), (1, warned), "{done:?}");
     }
 }

@@ -1,4 +1,5 @@
-//! Models by expressions, as a user meets them: the commands of `docs/own-model.md` and `docs/models.md` are run.
+//! Models given by expressions, as users see them: the commands of `docs/own-model.md` and `docs/models.md`
+//! are run.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,7 +19,7 @@ pub(crate) fn document(name: &str) -> String {
     fs::read_to_string(root().join("docs").join(name)).expect("a document")
 }
 
-/// The contents of the blocks of `text` in the language `language`.
+/// The contents of the code blocks of `text` in the language `language`.
 pub(crate) fn blocks<'a>(text: &'a str, language: &str) -> Vec<&'a str> {
     let fence = format!("```{language}\n");
     text.split(&fence).skip(1).map(|rest| rest.split("```").next().unwrap_or_default()).collect()
@@ -40,18 +41,18 @@ fn own_model() -> Workshop {
 #[test]
 fn the_page_on_own_models_is_what_happens() {
     let (workshop, text) = (own_model(), document("own-model.md"));
-    let mut told = String::new();
+    let mut printed = String::new();
     for block in blocks(&text, "console") {
         for line in block.lines().filter_map(|line| line.strip_prefix("$ punctual ")) {
             let stdout = workshop.punctual(line.split(' ')).success();
             if line.starts_with("check") {
                 assert_eq!(block, format!("$ punctual {line}\n{stdout}"));
             }
-            told = stdout;
+            printed = stdout;
         }
     }
     for line in blocks(&text, "text").concat().lines() {
-        assert!(told.contains(line), "{line:?} in {told}");
+        assert!(printed.contains(line), "{line:?} in {printed}");
     }
     assert!(workshop.files().contains(&"out".to_owned()));
 }
@@ -84,7 +85,8 @@ fn expressions_that_are_refused() {
     assert!(!workshop.files().contains(&"my.fmu".to_owned()));
 }
 
-/// What a plant tells beside its states, by an expression: a neighbour that goes as fast along x.
+/// An output of a plant besides its states, given by an expression: a neighbour that moves equally fast along
+/// x.
 #[test]
 fn an_output_is_an_expression_of_states() {
     let workshop = Workshop::new();
@@ -102,18 +104,18 @@ fn an_output_is_an_expression_of_states() {
     workshop.write("system.toml", system);
     workshop.punctual(["run", "system.toml", "--out", "out"]).success();
     let table = Table::parse(&workshop.text("out/system.csv"));
-    let [told, v, theta, x, along] =
+    let [output, v, theta, x, along] =
         ["car.y.v_x", "car.x.v", "car.x.theta", "follower.x.x", "car.x.x_p"].map(|name| table.column(name));
-    for i in 0..told.len() {
-        assert!((told[i] - v[i] * theta[i].cos()).abs() < 1e-12, "{i}: {}", told[i]);
+    for i in 0..output.len() {
+        assert!((output[i] - v[i] * theta[i].cos()).abs() < 1e-12, "{i}: {}", output[i]);
     }
-    // Held over 0.1 s, the speed is off by half of what it changes: 0.07 m of 2.2 m.
-    let last = told.len() - 1;
-    assert!(told[0] == 2.0 && along[last] > 2.0 && (x[last] - along[last]).abs() < 0.15, "{}", x[last]);
+    // Held over 0.1 s, the speed is off by half of its change: 0.07 m of 2.2 m.
+    let last = output.len() - 1;
+    assert!(output[0] == 2.0 && along[last] > 2.0 && (x[last] - along[last]).abs() < 0.15, "{}", x[last]);
 }
 
-/// A car whose jerk is off by up to 3 m/s³, with a filter that knows: the promise is kept, the same run repeats,
-/// and another seed gives another run.
+/// A car whose jerk is off by up to 3 m/s³, with a filter that accounts for it: the promise is kept, the same
+/// run repeats, and another seed gives another run.
 #[test]
 fn a_disturbed_car_keeps_its_promise() {
     let workshop = own_model();
@@ -135,7 +137,7 @@ fn a_disturbed_car_keeps_its_promise() {
     assert!(apart(&first, &still) > 1e-3 && apart(&first, &second) > 1e-3, "the disturbance does nothing");
 }
 
-/// Noise is on the measurement: the car itself goes on at 10 m/s.
+/// Noise only affects the measurement: the car itself continues at 10 m/s.
 #[test]
 fn a_measurement_is_off_by_its_bound_at_most() {
     let workshop = own_model();
@@ -151,7 +153,7 @@ fn a_measurement_is_off_by_its_bound_at_most() {
     assert!(table.column("plant.x.v").iter().all(|v| *v == 10.0));
     let errors: Vec<f64> =
         table.column("plant.x.p").iter().zip(table.column("time")).map(|(p, t)| p - 10.0 * t).collect();
-    // Beside the bound, round-off of 8000 steps.
+    // The bound, plus round-off of 8000 steps.
     assert!(errors.iter().all(|e| e.abs() <= 0.5 + 1e-9));
     let last = errors.len() / 2;
     for part in [&errors[..last], &errors[last..]] {
@@ -159,7 +161,8 @@ fn a_measurement_is_off_by_its_bound_at_most() {
     }
 }
 
-/// Without torques the kinetic energy ½ wᵀM(q)w stays: mass matrix, its inverse and the Coriolis terms agree.
+/// Without torques the kinetic energy ½ wᵀM(q)w is constant: mass matrix, its inverse and the Coriolis terms
+/// agree.
 #[test]
 fn the_arm_keeps_its_energy() {
     let workshop = Workshop::with_library();
@@ -183,12 +186,12 @@ fn the_arm_keeps_its_energy() {
         let of = |pick: fn(f64, f64) -> f64| values.iter().copied().reduce(pick).expect("rows");
         of(f64::max) - of(f64::min)
     };
-    // The tolerance covers the error of the Runge-Kutta method with steps of 1 ms.
+    // The tolerance covers the error of the Runge–Kutta method with steps of 1 ms.
     assert!(spread(&energy) < 1e-8, "{} of {}", spread(&energy), energy[0]);
     assert!(spread(&w_1) > 1.0, "nothing is exchanged between the joints");
 }
 
-/// Runs the example `stem`: the table's rows of its barriers, which all kept their promise.
+/// Runs the example `stem`; returns the rows of its barriers, whose promises must all be kept.
 fn rows(stem: &str) -> Vec<String> {
     let workshop = Workshop::with_library();
     for kind in ["-filter", "-plant", ""] {
@@ -196,16 +199,16 @@ fn rows(stem: &str) -> Vec<String> {
         workshop.write(&name, example(&name));
     }
     let (filter, plant) = (format!("{stem}-filter.toml"), format!("{stem}-plant.toml"));
-    // `check` runs with u_ref = 0, which not all examples have.
-    let told = workshop.punctual(["check", &filter, "--plant", &plant, "--json"]).stdout;
-    let told: serde_json::Value = serde_json::from_str(&told).expect("JSON");
+    // `check` runs with u_ref = 0, which not all examples use.
+    let printed = workshop.punctual(["check", &filter, "--plant", &plant, "--json"]).stdout;
+    let printed: serde_json::Value = serde_json::from_str(&printed).expect("JSON");
     for toml in [&filter, &plant] {
         workshop.punctual(["build", toml, "-o", &toml.replace(".toml", ".fmu")]).success();
     }
     workshop.punctual(["run", &format!("{stem}.toml"), "--out", "out", "--require", "kept"]).success();
     let table = Table::parse(&workshop.text(&format!("out/{stem}.csv")));
     assert!(
-        // Unchanged, filtered, or a plan's (8).
+        // Unchanged, filtered, or from a plan (8).
         table.column("filter.status").iter().all(|s| *s <= 1.0 || *s == 8.0),
         "{stem}: a constraint was not satisfied"
     );
@@ -214,7 +217,7 @@ fn rows(stem: &str) -> Vec<String> {
         text.lines().filter_map(|line| line.strip_prefix("expression = \"")?.split('"').next());
     let time = table.column("time");
     let mut rows = Vec::new();
-    for barrier in told["barriers"].as_array().expect("barriers") {
+    for barrier in printed["barriers"].as_array().expect("barriers") {
         let name = barrier["name"].as_str().expect("a name");
         let (degree, unit) = (&barrier["relative_degree"], barrier["unit"].as_str().expect("a unit"));
         let given = barrier["deadline"].as_f64();
@@ -243,7 +246,8 @@ fn the_models_keep_their_promises_with_the_figures_of_the_page() {
     assert!(text.contains(&found), "docs/models.md should have\n{found}");
 }
 
-/// A plant that falls by itself, from a file: promised, and kept while u_ref pushes either way or not at all.
+/// A plant that falls over on its own, from a file. It is promised, and kept whether u_ref pushes either way
+/// or not at all.
 #[test]
 fn the_pole_stays_up_whatever_is_wanted() {
     let workshop = Workshop::with_library();

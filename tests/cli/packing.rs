@@ -1,5 +1,5 @@
-//! `punctual build SYSTEM.toml -o X.ssp`: the package, and the refusals. `tests/interop` tests that other tools
-//! read it.
+//! `punctual build SYSTEM.toml -o X.ssp`: the package, and the refusals. `tests/interop` tests that other
+//! tools read it.
 
 use std::fs;
 
@@ -94,7 +94,7 @@ fn a_system_is_packed_with_its_fmus() {
     }
 }
 
-/// A configuration is packed as the FMU that it becomes.
+/// A configuration is packed as the FMU built from it.
 #[test]
 fn a_system_of_configurations_is_packed_as_one_of_fmus() {
     let workshop = Workshop::with_library();
@@ -180,7 +180,7 @@ from = "plant.x"
 to = "filter.x"
 "#;
 
-/// Arrays of FMI 3.0 have a place in SSP 2.0 only, and as a whole only.
+/// Only SSP 2.0 has arrays of FMI 3.0, and only as a whole.
 #[test]
 fn arrays_are_packed_by_version_two() {
     let workshop = Workshop::with_library();
@@ -211,7 +211,7 @@ fn arrays_are_packed_by_version_two() {
     assert!(!ssd.contains("\"u[1]\""), "{ssd}");
     let ssv = entry(&workshop, "my.ssp", "resources/start_values.ssv");
     assert!(ssv.contains("<ssv:Real value=\"0.5 0.25\"/>\n      <ssc:Dimension size=\"2\"/>\n"), "{ssv}");
-    // An element alone has no place.
+    // A single element cannot be represented.
     workshop.write("my.toml", ARRAYS.replace("u_ref = [0.5, 0.25]", "\"u_ref[1]\" = 0.5"));
     let done = workshop.punctual(["build", "my.toml", "-o", "my.ssp", "--ssp", "2"]);
     done.fails_like(2, "my.toml: component[0].start.\"u_ref[1]\": ", &["is an element of u_ref"]);

@@ -1,13 +1,14 @@
-//! The tutorial and the page on obstacles: their steps are done, and what they show is what happens.
+//! The tutorial and the page on obstacles: their steps are carried out, and their output is what the pages
+//! show.
 
 use crate::models::{blocks, document};
 use crate::workshop::Workshop;
 
-/// Asserts that each line of `shown` is a line of `told`, but for blanks at its end.
+/// Asserts that each line of `shown` is a line of `printed`, except for trailing blanks.
 #[track_caller]
-fn assert_told(shown: &str, told: &str) {
+fn assert_printed(shown: &str, printed: &str) {
     for line in shown.lines() {
-        assert!(told.lines().any(|said| said.trim_end() == line), "{line:?} in {told}");
+        assert!(printed.lines().any(|said| said.trim_end() == line), "{line:?} in {printed}");
     }
 }
 
@@ -29,26 +30,29 @@ fn the_tutorial_is_what_happens() {
         assert_eq!(done.code, code, "{done:#?}");
         done
     };
-    assert_told(backup_plan, &check(0).stdout);
-    assert_told(verdicts, &run());
+    assert_printed(backup_plan, &check(0).stdout);
+    assert_printed(verdicts, &run());
     assert!(workshop.path("car/car-path.svg").exists() && workshop.path("car/car-h.svg").exists());
 
     changed("deadline = 10.0", "deadline = 5.0");
-    assert_told(sooner, &run());
+    assert_printed(sooner, &run());
     changed("deadline = 10.0", "deadline = 4.0");
-    let told = check(1).stdout;
-    assert_told(refused, &told);
-    assert!(text.contains("3.01 s (no input within") && told.contains("3.01 s (no input within"));
+    let printed = check(1).stdout;
+    assert_printed(refused, &printed);
+    assert!(text.contains("3.01 s (no input within") && printed.contains("3.01 s (no input within"));
     assert_eq!(workshop.punctual(["run", "car.toml"]).code, 1, "refused and missed");
     changed("deadline = 10.0", "when_infeasible = \"earliest\"\ndeadline = 4.0");
-    let told = workshop.punctual(["run", "car.toml"]);
-    assert!(text.contains("after 4.13 s") && told.code == 1 && told.stdout.contains("4.131"), "{told:#?}");
+    let printed = workshop.punctual(["run", "car.toml"]);
+    assert!(
+        text.contains("after 4.13 s") && printed.code == 1 && printed.stdout.contains("4.131"),
+        "{printed:#?}"
+    );
 
     let [tree, plant] = blocks(&text, "toml")[..] else { panic!("two files") };
     workshop.write("car.toml", format!("{file}\n{tree}"));
-    assert_told(around, &run());
+    assert_printed(around, &run());
     workshop.write("car.toml", format!("{file}\n{}", tree.replace("[29.0, 8.0]", "[25.0, 15.0]")));
-    assert_told(never, &check(1).stdout);
+    assert_printed(never, &check(1).stdout);
 
     let mistakes: Vec<_> = text.lines().filter_map(|line| line.strip_prefix("| `")).collect();
     for (row, right) in mistakes[mistakes.len() - 2..].iter().zip(["radius = 3.0 ", "centre = [20.0, -1.0]"])
@@ -69,7 +73,7 @@ fn the_tutorial_is_what_happens() {
     assert!(workshop.files().contains(&"plant.fmu".to_owned()));
 }
 
-/// Each file, and the lines of its run that follow it.
+/// Each file, followed by the lines that its run prints.
 #[test]
 fn the_page_on_obstacles_is_what_happens() {
     let (workshop, text) = (Workshop::new(), document("obstacles.md"));
@@ -78,12 +82,12 @@ fn the_page_on_obstacles_is_what_happens() {
     for part in parts {
         let (file, rest) = part.split_once("```").expect("its end");
         workshop.write("my.toml", file);
-        let told = workshop.punctual(["run", "my.toml", "--signals"]);
+        let printed = workshop.punctual(["run", "my.toml", "--signals"]);
         let shown = blocks(rest, "text").first().copied().unwrap_or_default();
-        assert_eq!(told.code, i32::from(shown.contains("not kept")), "{told:#?}");
-        assert_told(shown, &told.stdout);
+        assert_eq!(printed.code, i32::from(shown.contains("not kept")), "{printed:#?}");
+        assert_printed(shown, &printed.stdout);
     }
-    // What is said of the two files beside: alone rows get stuck, and with a hint there is a way.
+    // The two variants on the page: on their own, rows get stuck; with a hint there is a way.
     let all = blocks(&text, "toml");
     let [.., rows, hinted, _, _] = all[..] else { panic!("{all:?}") };
     workshop.write("my.toml", rows.replace("assurance = \"off\"", "assurance = \"on\""));

@@ -1,4 +1,5 @@
-//! Plug-ins: the examples against the same models as expressions, everything that is refused, what crashes.
+//! Plug-ins: the examples compared with the same models as expressions, everything that is refused, and
+//! crashes.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -24,7 +25,7 @@ fn compile(program: &str, arguments: &[&str], source: &Path, product: &Path) {
     assert!(done.status.success(), "{program}: {}", String::from_utf8_lossy(&done.stderr));
 }
 
-/// The compiler that `variable` names, or `default`.
+/// The compiler given by the variable `variable`, or else `default`.
 fn compiler(variable: &str, default: &str) -> String {
     std::env::var(variable).unwrap_or_else(|_| default.to_owned())
 }
@@ -57,7 +58,7 @@ fn example(workshop: &Workshop, source: &str, name: &str) {
 /// Compiles `tests/fixtures/plugin.c` with `macros` to the plug-in `fixture` of `workshop`.
 fn fixture(workshop: &Workshop, macros: &[&str]) {
     let product = workshop.path(&plugin_file_name("fixture"));
-    // A child that ends may still have loaded the file that the linker writes over.
+    // An ending child may still have the file loaded that the linker overwrites.
     let _ = fs::remove_file(&product);
     let macros: Vec<String> = macros.iter().map(|name| format!("-D{name}")).collect();
     let arguments: Vec<&str> = STRICT.into_iter().chain(macros.iter().map(String::as_str)).collect();
@@ -68,7 +69,8 @@ fn copy(workshop: &Workshop, folder: &str, name: &str) {
     workshop.write(name, fs::read(root().join("examples").join(folder).join(name)).expect("an example"));
 }
 
-/// Builds filter and plant of `stem` and runs them: the table, and that every promise was kept.
+/// Builds filter and plant of `stem` and runs them; returns the table after asserting that every promise was
+/// kept.
 fn run(workshop: &Workshop, stem: &str) -> Table {
     for kind in ["filter", "plant"] {
         let name = format!("{stem}-{kind}");
@@ -78,8 +80,8 @@ fn run(workshop: &Workshop, stem: &str) -> Table {
     Table::parse(&workshop.text(&format!("out/{stem}.csv")))
 }
 
-/// The system `stem` with the plug-in of `examples/plugin`, and with the expressions of `examples/models`. The edits `of_both` are
-/// made in both filters, `of_expressions` in that of expressions.
+/// The system `stem` with the plug-in of `examples/plugin`, and with the expressions of `examples/models`.
+/// The edits `of_both` are made in both filters, `of_expressions` only in the one with expressions.
 fn both(source: &str, stem: &str, of_both: &[(&str, &str)], of_expressions: &[(&str, &str)]) -> [Table; 2] {
     let (plugin, expressions) = (Workshop::with_library(), Workshop::with_library());
     example(&plugin, source, source.split('.').next().expect("a stem"));
@@ -102,7 +104,7 @@ fn both(source: &str, stem: &str, of_both: &[(&str, &str)], of_expressions: &[(&
     [run(&plugin, stem), run(&expressions, stem)]
 }
 
-/// The operations are the same in the same order, so the bits are.
+/// Both perform the same operations in the same order, so the results are bitwise equal.
 #[test]
 fn the_car_in_c_is_the_car_of_expressions() {
     let [plugin, expressions] = both("jerk_car.c", "jerk-car", &[], &[("\"limit\"", "\"speed\"")]);
@@ -114,9 +116,10 @@ fn the_car_in_c_is_the_car_of_expressions() {
     assert!(compared > 20 && plugin.len() > 700);
 }
 
-/// The mass matrix is solved in another order, so round-off differs. The loop of filter and plant neither damps
-/// nor amplifies it much over its 800 steps. A step of the input along the profile is of the size of its rates,
-/// 100 1/s², times that of the state. Rows alone: round-off decides whether a plan passes.
+/// The mass matrix is solved in another order, so round-off differs. The loop of filter and plant neither
+/// damps nor amplifies it much over its 800 steps. A step of the input along the profile is of the order of
+/// its rates, 100 1/s², times that of the state. Only rows are used, since round-off would decide whether a
+/// plan passes.
 #[test]
 fn the_arm_in_rust_is_the_arm_of_expressions() {
     const STATE: f64 = 1e-11;
@@ -153,7 +156,7 @@ const FILTER: &str =
 fn libraries_that_are_refused() {
     let workshop = Workshop::with_library();
     workshop.write("f.toml", FILTER);
-    let mut told = String::new();
+    let mut printed = String::new();
     for macros in [
         "NO_SYMBOL",
         "MODEL=NULL",
@@ -200,17 +203,17 @@ fn libraries_that_are_refused() {
         fixture(&workshop, &macros.split(", -D").collect::<Vec<_>>());
         let done = workshop.punctual(["build", "f.toml", "-o", "f.fmu"]);
         assert_eq!((done.code, done.stdout.as_str()), (2, ""), "{macros}: {done:?}");
-        told += &format!("{macros}\n    {}", done.stderr);
+        printed += &format!("{macros}\n    {}", done.stderr);
         assert!(!workshop.files().contains(&"f.fmu".to_owned()), "{macros}");
     }
-    let told = told.replace(&plugin_file_name("fixture"), "LIBRARY");
-    assert_golden("plugins-refused.txt", &told);
+    let printed = printed.replace(&plugin_file_name("fixture"), "LIBRARY");
+    assert_golden("plugins-refused.txt", &printed);
     let page = fs::read_to_string(root().join("docs/plugin.md")).expect("the page");
     let messages: Vec<_> =
         page.lines().filter_map(|line| line.split_once("| `plant.")?.1.strip_suffix("` |")).collect();
     assert_eq!(messages.len(), 5);
     for message in messages {
-        assert!(told.contains(&format!(" f.toml: plant.{message}\n")), "docs/plugin.md says {message:?}");
+        assert!(printed.contains(&format!(" f.toml: plant.{message}\n")), "docs/plugin.md says {message:?}");
     }
 }
 
@@ -221,7 +224,7 @@ fn configurations_that_are_refused() {
     fixture(&workshop, &[]);
     let head = "kind = \"filter\"\n[plant]\nplugin = \"fixture\"\n";
     let wall = "[[barrier]]\nname = \"wall\"\ndeadline = 2.0\n";
-    let mut told = String::new();
+    let mut printed = String::new();
     for text in [
         FILTER.replace("\"fixture\"", "\"other\""),
         FILTER.replace("\"fixture\"", "\"../fixture\""),
@@ -252,17 +255,20 @@ fn configurations_that_are_refused() {
         workshop.write("f.toml", &text);
         let done = workshop.punctual(["check", "f.toml"]);
         assert_eq!((done.code, done.stdout.as_str()), (2, ""), "{text}: {done:?}");
-        told += &format!("{}    {}", text.split_once('\n').expect("lines").1, done.stderr);
+        printed += &format!("{}    {}", text.split_once('\n').expect("lines").1, done.stderr);
     }
-    let told =
-        told.replace(&plugin_file_name("fixture"), "LIBRARY").replace(&plugin_file_name("other"), "OTHER");
-    // The digest is made from the bytes that the compiler wrote.
-    let digest = told.split("has \"").nth(1).and_then(|rest| rest.get(..36)).expect("a digest").to_owned();
-    assert_golden("plugins-configured.txt", &told.replace(&digest, "DIGEST").replace(PLATFORM, "PLATFORM"));
+    let printed =
+        printed.replace(&plugin_file_name("fixture"), "LIBRARY").replace(&plugin_file_name("other"), "OTHER");
+    // The digest depends on the bytes that the compiler wrote.
+    let digest = printed.split("has \"").nth(1).and_then(|rest| rest.get(..36)).expect("a digest").to_owned();
+    assert_golden(
+        "plugins-configured.txt",
+        &printed.replace(&digest, "DIGEST").replace(PLATFORM, "PLATFORM"),
+    );
 }
 
-/// What is not the file that an FMU was made with is refused before anything of it runs: a library that was cut short may end the
-/// process that loads it.
+/// A file other than the one the FMU was built with is refused before any of it runs, since a truncated
+/// library may end the process that loads it.
 #[test]
 fn a_file_that_was_cut_short_is_told_by_its_digest() {
     let workshop = Workshop::with_library();
@@ -278,15 +284,15 @@ fn a_file_that_was_cut_short_is_told_by_its_digest() {
     }
 }
 
-/// Two compilations, two GUIDs; the same twice, the same bytes.
+/// Two different compilations give two GUIDs; the same one twice gives the same bytes.
 #[test]
 fn the_guid_and_the_fmu_depend_on_the_library() {
     let workshop = Workshop::with_library();
     workshop.write("f.toml", FILTER);
     let build = |macros: &[&str]| {
         fixture(&workshop, macros);
-        let told = workshop.punctual(["build", "f.toml", "-o", "f.fmu"]).success();
-        (told, workshop.bytes("f.fmu"))
+        let printed = workshop.punctual(["build", "f.toml", "-o", "f.fmu"]).success();
+        (printed, workshop.bytes("f.fmu"))
     };
     let (first, again, second) = (build(&[]), build(&[]), build(&["OWN_SINE"]));
     assert!(first == again, "{} and {}", first.0, again.0);
@@ -294,7 +300,7 @@ fn the_guid_and_the_fmu_depend_on_the_library() {
     assert_eq!(without_guids(&first.0), without_guids(&second.0));
 }
 
-/// The library of an FMU that is exchanged, or gone.
+/// The library of an FMU was replaced, or is missing.
 #[test]
 fn an_fmu_with_another_library_is_refused() {
     let workshop = Workshop::with_library();
@@ -326,7 +332,7 @@ fn an_fmu_with_another_library_is_refused() {
     }
 }
 
-/// Libraries of two systems: each makes another GUID, unless the configuration has the digests of both.
+/// Libraries of two systems: each gives another GUID, unless the configuration has the digests of both.
 #[test]
 fn an_fmu_of_two_systems_has_the_digests_of_both() {
     const OTHER: &str = "aarch64-linux";
@@ -343,18 +349,18 @@ fn an_fmu_of_two_systems_has_the_digests_of_both() {
     let (_, here) = build("here.fmu", &[], "");
     let (theirs, there) = build("there.fmu", &["OWN_SINE"], "");
     assert_ne!(here.success(), there.success());
-    let told = merge().stderr;
+    let printed = merge().stderr;
     let advice = "; the GUID of an FMU with a plug-in is made from its library too: build with a plugin_digest for \
                   every platform (docs/plugin.md)\n";
-    assert!(told.starts_with(
+    assert!(printed.starts_with(
         "error: there.fmu: cannot be merged: modelDescription.xml differs from here.fmu's: guid"
     ));
-    assert!(told.ends_with(advice), "{told}");
+    assert!(printed.ends_with(advice), "{printed}");
 
-    // The digests stand in the messages of a build that has none.
+    // The messages of a build without digests contain them.
     let digest = |macros: &[&str]| {
-        let told = build("x.fmu", macros, &format!(", plugin_digest = {{ {OTHER} = \"\" }}")).1.stderr;
-        told.split("has \"").nth(1).and_then(|rest| rest.get(..36)).expect("a digest").to_owned()
+        let printed = build("x.fmu", macros, &format!(", plugin_digest = {{ {OTHER} = \"\" }}")).1.stderr;
+        printed.split("has \"").nth(1).and_then(|rest| rest.get(..36)).expect("a digest").to_owned()
     };
     let digests = format!(
         ", plugin_digest = {{ {OTHER} = {:?}, {PLATFORM} = {:?} }}",
@@ -377,15 +383,15 @@ fn an_fmu_of_two_systems_has_the_digests_of_both() {
     }
 }
 
-/// A model that is not defined at a state gives a status of the filter, and an error of the plant's step.
+/// Outside the domain of a model, the filter returns a status, and the plant's step fails.
 #[test]
 fn outside_the_domain_nothing_crashes() {
     let workshop = Workshop::with_library();
     fixture(&workshop, &["STOPS"]);
     workshop.write("f.toml", FILTER.replace("wall", "root"));
     for (x, status) in [("x=0.5", "unchanged"), ("x=-4", "singular")] {
-        let told = workshop.punctual(["check", "f.toml", "--x0", x]);
-        assert!(told.stdout.contains(&format!("u_ref = 0: {status}\n")), "{told:?}");
+        let printed = workshop.punctual(["check", "f.toml", "--x0", x]);
+        assert!(printed.stdout.contains(&format!("u_ref = 0: {status}\n")), "{printed:?}");
     }
     workshop.write("p.toml", "kind = \"plant\"\nplant.plugin = \"fixture\"\nx0.v = 1.0\n");
     workshop.punctual(["build", "p.toml", "-o", "p.fmu"]).success();
@@ -393,11 +399,12 @@ fn outside_the_domain_nothing_crashes() {
          start = { \"u.u\" = 0.0 }\n";
     workshop.write("s.toml", system);
     let done = workshop.punctual(["run", "s.toml", "--out", "out"]);
-    let told = ["error: fmi2DoStep of p (p.fmu) at t = 1.1 s returned fmi2Error", "x.x becomes NaN"];
-    assert!(done.code == 1 && told.iter().all(|part| done.stderr.contains(part)), "{done:?}");
+    let parts = ["error: fmi2DoStep of p (p.fmu) at t = 1.1 s returned fmi2Error", "x.x becomes NaN"];
+    assert!(done.code == 1 && parts.iter().all(|part| done.stderr.contains(part)), "{done:?}");
 }
 
-/// A function by its own derivatives is the function: the sine of the header and one of the model's own.
+/// A function given by its derivatives equals the function: the sine of the header and one implemented in the
+/// model.
 #[test]
 fn a_function_by_its_derivatives_is_the_function() {
     let workshop = Workshop::with_library();
@@ -417,7 +424,7 @@ fn a_function_by_its_derivatives_is_the_function() {
     };
     let (header, own) = (run(&[]), run(&["OWN_SINE"]));
     for name in ["f.u.u", "f.sine.h", "p.x.x", "p.x.v"] {
-        // Round-off over 400 steps, in inputs of the size of 100.
+        // Round-off over 400 steps, for inputs of order 100.
         let pairs = header.column(name).into_iter().zip(own.column(name));
         let apart = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(apart <= 1e-9, "{name}: {apart:e}");

@@ -1,4 +1,4 @@
-//! `punctual reproduce`: its refusals. (Its findings take an optimised build: tests/interop.)
+//! `punctual reproduce`: its refusals. (Its findings require an optimised build: see tests/interop.)
 
 use crate::workshop::Workshop;
 

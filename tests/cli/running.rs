@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::table::Table;
 use crate::workshop::{Workshop, assert_golden, examples};
 
-/// The example's system file for the FMUs of [`Workshop::with_fmus`], with `edits` made to it.
+/// The example's system file for the FMUs of [`Workshop::with_fmus`], with `edits`.
 pub(crate) fn system(edits: &[(&str, &str)]) -> String {
     let mut text = fs::read_to_string(examples().join("unicycle.toml")).expect("the example");
     let names = [("unicycle-filter.fmu\"", "filter.fmu\""), ("unicycle-plant.fmu\"", "plant.fmu\"")];
@@ -18,7 +18,7 @@ pub(crate) fn system(edits: &[(&str, &str)]) -> String {
     text
 }
 
-/// Runs a system for its CSV.
+/// Runs a system and returns its CSV.
 pub(crate) fn recorded(edits: &[(&str, &str)], more: &str) -> Table {
     let workshop = Workshop::with_fmus();
     workshop.write("system.toml", system(edits) + more);
@@ -26,7 +26,7 @@ pub(crate) fn recorded(edits: &[(&str, &str)], more: &str) -> Table {
     Table::parse(&workshop.text("out/system.csv"))
 }
 
-/// The deadline and radius of the example; the end of its run.
+/// The deadline and radius of the example, and the end of its run.
 const DEADLINE: f64 = 10.0;
 
 #[test]
@@ -37,7 +37,7 @@ fn the_example_keeps_its_promise() {
     assert_eq!((time[0], time[20_000]), (0.0, 20.0));
     let arrival = h.iter().position(|h| *h >= 0.0).expect("it arrives");
     assert!(time[arrival] <= DEADLINE, "it arrives at {}", time[arrival]);
-    // The sample at the deadline is among those it must be inside at.
+    // The sample at the deadline must already be inside.
     let after = time.iter().zip(&h).filter(|(t, _)| **t >= DEADLINE - 1e-9).map(|(_, h)| *h);
     assert!(after.fold(f64::INFINITY, f64::min) >= 0.0, "it leaves again");
     assert!(table.column("filter.status").iter().all(|s| *s <= 1.0), "a constraint was not satisfied");
@@ -83,7 +83,7 @@ fn jacobi_order_is_one_step_late() {
         assert_eq!(table.column("filter.u.a"), table.column("plant.u.a"));
     }
     let (prompt, late) = (prompt.column("plant.u.omega"), late.column("plant.u.omega"));
-    // The first samples see the same state; the turning rate then grows by less than 0.03 a step.
+    // The first samples see the same state; after that the turning rate grows by less than 0.03 per step.
     assert_eq!(late[0].to_bits(), prompt[0].to_bits());
     assert_eq!(late[1].to_bits(), prompt[0].to_bits(), "the sample of 0 s acts until 2 ms");
     assert!(prompt[1] > prompt[0]);
@@ -144,7 +144,7 @@ fn pictures_are_written_beside_the_table() {
     }
 }
 
-/// The verdict on the promise is told and, where it is required, decides the exit code.
+/// The verdict on the promise is reported and, if required, determines the exit code.
 #[test]
 fn promises_that_are_required() {
     let promise = |bound: &str, require: bool, isolate: bool| {
@@ -163,7 +163,7 @@ fn promises_that_are_required() {
     let (code, kept) = promise("20.0", true, false);
     assert_eq!((code, &kept["barrier"], &kept["unmet"]), (0, &"filter.goal".into(), &0.into()), "{kept}");
     assert!(kept["arrival"].as_f64().is_some_and(|t| t <= DEADLINE) && kept["late"].is_null(), "{kept}");
-    // 60.8 m with 1 m/s2: at least 11 s from rest, so it is certain before the deadline.
+    // 60.8 m with 1 m/s2 takes at least 11 s from rest, so lateness is certain before the deadline.
     let (code, late) = promise("1.0", false, false);
     assert_eq!(code, 1, "{late}");
     assert!(late["late"].as_f64().is_some_and(|t| t < DEADLINE), "{late}");

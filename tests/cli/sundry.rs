@@ -1,12 +1,12 @@
-//! FMUs of FMI 3.0, alone and beside those of FMI 2.0: every type, arrays, structural parameters, and each way to
-//! misbehave.
+//! FMUs of FMI 3.0, alone and together with those of FMI 2.0: every type, arrays, structural parameters, and
+//! all kinds of misbehaviour.
 
 use crate::misbehaving::{self, description, sundry, write_sundry};
 use crate::table::Table;
 use crate::validating::listed;
 use crate::workshop::{Done, Workshop};
 
-/// One FMU of FMI 3.0 feeds another, which has this defect and these macros.
+/// One FMU of FMI 3.0 feeds another, which has this defect and was compiled with these macros.
 fn workshop(defect: &str, macros: &[&str]) -> Workshop {
     let workshop = Workshop::new();
     write_sundry(&workshop, "a.fmu", sundry("none", &[]), &[]);
@@ -14,7 +14,7 @@ fn workshop(defect: &str, macros: &[&str]) -> Workshop {
     workshop
 }
 
-/// The system of both with these start values and connections; what is not given stays as the FMU has it.
+/// The system of both with these start values and connections; everything else keeps the FMU's values.
 fn system(a: &str, b: &str, wiring: &str) -> String {
     let component = |name: &str, start: &str| {
         format!(
@@ -66,7 +66,7 @@ fn a_value_of_every_type_goes_in_and_comes_out() {
     ] {
         assert_eq!(rows.column(&format!("b.out_{name}")), vec![expected; 11], "{name}");
     }
-    // Its Euler steps of 0.1 s.
+    // Euler steps of 0.1 s.
     let y: Vec<f64> = std::iter::successors(Some(0.0), |y| Some(y + 0.1 * 2.0)).take(11).collect();
     assert_eq!(rows.column("b.y[2]"), y);
 }
@@ -146,7 +146,7 @@ fn structural_parameters_size_arrays_before_the_initialisation() {
 fn texts_are_parameters_too() {
     let workshop = workshop("none", &[]);
     run(&workshop, &system("u = [0, 0]", "u = [0, 0], in_string = \"five!\"", "")).success();
-    // The FMU shows the length.
+    // The FMU outputs the length.
     assert_eq!(rows(&workshop).column("b.out_int8")[0], 5.0);
 }
 
@@ -159,7 +159,7 @@ fn both_versions_in_one_system() {
     let done = run(&workshop, &text);
     assert_eq!(done.code, 0, "{done:#?}");
     let table = rows(&workshop);
-    // y of the first counts steps and adds u; the other sums what it is given.
+    // y of the first counts steps and adds u; the other sums its input.
     let y = table.column("a.y");
     assert_eq!(y[10], 11.0);
     let z = table.column("b.z");
@@ -204,8 +204,9 @@ fn each_defect_of_a_step_names_the_component() {
     ] {
         let done = run(&workshop(defect, &[]), &still);
         let error = format!("error: fmi3DoStep of b (b.fmu) at t = 0.2 s {message}\n");
-        let told = done.stderr.ends_with(&error) || done.stderr.ends_with(&error.replace("0.2 s", "0.3 s"));
-        assert!(done.code == 1 && told, "{defect}: {done:#?}");
+        let printed =
+            done.stderr.ends_with(&error) || done.stderr.ends_with(&error.replace("0.2 s", "0.3 s"));
+        assert!(done.code == 1 && printed, "{defect}: {done:#?}");
     }
     let done = run(&workshop("off-in-step", &[]), &still);
     let note = "note: b: its step to t = 0.3 s reached t = 0.29 s (lastSuccessfulTime), and others after it may too\n";
@@ -236,7 +237,7 @@ fn what_cannot_be_run_is_refused_in_plain_words() {
         1,
         "fmi3InstantiateCoSimulation of b (b.fmu) returned no instance\n  [fmi3Error, logStatusError] no licence",
     );
-    // It is asked again, with the log wanted.
+    // It is called again, with logging on.
     run(&workshop("no-instance-quiet", &[]), &still).fails(
         1,
         "fmi3InstantiateCoSimulation of b (b.fmu) returned no instance\n  [fmi3Error, logStatusError] no licence, said to who asks",
@@ -276,7 +277,7 @@ fn what_cannot_be_run_is_refused_in_plain_words() {
     );
 }
 
-/// Both are whole numbers. One that is no item of the enumeration ends the run.
+/// Both carry whole numbers. A number that is no item of the enumeration ends the run.
 #[test]
 fn whole_numbers_and_enumerations_are_connected() {
     let workshop = workshop("none", &[]);
@@ -323,7 +324,7 @@ fn whole_numbers_and_enumerations_are_connected() {
     );
 }
 
-/// Parameters, inputs that nothing feeds, and elements of them are recorded where they are named.
+/// Parameters, unconnected inputs, and their elements are recorded if they are named.
 #[test]
 fn everything_that_is_a_number_can_be_recorded() {
     let workshop = workshop("none", &[]);
@@ -340,7 +341,7 @@ fn everything_that_is_a_number_can_be_recorded() {
         .fails(2, "system.toml: record.signals[0]: b.in_string is String; text is not recorded");
 }
 
-/// `fmi3EnterInitializationMode` gets it.
+/// `fmi3EnterInitializationMode` receives it.
 #[test]
 fn a_tolerance_reaches_the_fmu() {
     let workshop = workshop("shows-tolerance", &[]);
@@ -415,7 +416,7 @@ fn a_trial_finds_what_a_sound_fmu_does_not_do() {
     assert_eq!(found, ["error trial.version trial: fmi3GetVersion answered \"3.9\"; must be \"3.0\""]);
 }
 
-/// A state that is not whole shows where the inputs move it: in a step that is made again.
+/// An incompletely saved state shows when the inputs affect the missing part: in a step that is repeated.
 #[test]
 fn a_trial_takes_steps_back() {
     for (defect, expected) in
@@ -425,10 +426,10 @@ fn a_trial_takes_steps_back() {
         let moving = [("start=\"0 0\"", "start=\"1 1\"")];
         write_sundry(&workshop, "x.fmu", sundry(defect, &moving), &["MOVING"]);
         let (_, found) = listed(&workshop, &[]);
-        let told = found
+        let printed = found
             .iter()
             .any(|f| f.starts_with("warning trial.state trial y[1]: is ") && f.contains(expected));
-        assert!(told, "{defect}: {found:#?}");
+        assert!(printed, "{defect}: {found:#?}");
     }
 }
 

@@ -1,5 +1,5 @@
-//! `punctual run` with FMUs that misbehave. The message names the component and its deed. The recorded rows are
-//! kept, with `--isolate` even when an FMU ends its process.
+//! `punctual run` with FMUs that misbehave. The message names the component and what it did. The recorded
+//! rows are kept, with `--isolate` even if an FMU ends its process.
 
 use punctual_cosim::host::PLATFORM;
 
@@ -91,7 +91,7 @@ fn odd_logs_are_shown_harmlessly() {
     assert!(!done.stderr.contains('\u{1b}') && done.stderr.contains("not UTF-8: \u{fffd}"), "{done:#?}");
 }
 
-/// The component environment is looked up, never followed, and no text is read where there is none.
+/// The component environment is compared, never dereferenced, and no text is read at an invalid address.
 #[test]
 fn what_a_logger_call_carries_is_not_trusted() {
     let fails = |defect: &str, log: &str| {
@@ -135,7 +135,7 @@ fn an_isolated_crash_is_told_and_the_rows_are_kept() {
         let error = format!("error: fmi2DoStep of bad (bad.fmu) at t = 0.2 s {how}\n");
         assert_eq!((done.code, done.stdout.as_str(), done.stderr), (1, "", format!("{note}{error}")));
         let table = Table::parse(&workshop.text("out/system.csv"));
-        // Both have feedthrough and step at 0.2 s before the row of 0.2 s is taken.
+        // Both have feedthrough and step at 0.2 s before the row of 0.2 s is recorded.
         assert_eq!(table.column("time"), [0.0, 0.1]);
         assert_eq!(table.column("good.y"), [1.0, 2.0]);
     }
@@ -181,7 +181,7 @@ fn isolation_changes_neither_results_nor_other_errors() {
     assert_eq!(report["steps"], 10);
 }
 
-/// A process that is ended has no time to remove what it unpacked.
+/// A process that is killed has no time to remove what it unpacked.
 #[test]
 fn nothing_is_left_behind() {
     let workshop = workshop("crash-in-step", &[]);
@@ -193,7 +193,7 @@ fn nothing_is_left_behind() {
     assert_eq!(std::fs::read_dir(workshop.path("tmp")).expect("a folder").count(), 0);
 }
 
-/// The description of an FMU without outputs that are numbers: y is a local variable.
+/// The description of an FMU without numeric outputs: y is a local variable.
 fn without_outputs(defect: &str) -> String {
     let unknown = "<Unknown index=\"1\" dependencies=\"2\" dependenciesKind=\"dependent\"/>";
     description(
@@ -208,7 +208,7 @@ fn without_outputs(defect: &str) -> String {
 
 const ALONE: &str = "[experiment]\nstop_time = 1.0\nstep = 0.1\n[[component]]\nname = \"one\"\nfmu = \"one.fmu\"\nstart = { u = 0.0 }\n";
 
-/// Of an FMU that refuses this before the run begins too, as the standard lets it.
+/// Also for an FMU that refuses to be read before the run begins, which the standard allows.
 #[test]
 fn local_variables_are_recorded_and_connected() {
     let workshop = Workshop::new();
@@ -265,7 +265,7 @@ fn a_tolerance_reaches_the_fmu() {
         .fails(2, "system.toml: experiment.tolerance: is -1; must be finite and > 0, such as 1e-6");
 }
 
-/// No C identifier: a finding of `validate`, and the FMU runs.
+/// A name that is no C identifier is a finding of `validate`, but the FMU runs.
 #[test]
 fn a_library_may_have_any_file_name() {
     let workshop = Workshop::new();
@@ -297,7 +297,7 @@ fn a_library_may_have_any_file_name() {
     workshop.punctual(["run", "system.toml"]).fails(1, &message);
 }
 
-/// What is out of scope is said so; nothing is wrong with the file.
+/// What is out of scope is reported as such; nothing is wrong with the file.
 #[test]
 fn other_interfaces_and_versions_are_out_of_scope() {
     let workshop = Workshop::new();
@@ -324,7 +324,7 @@ fn other_interfaces_and_versions_are_out_of_scope() {
             workshop.punctual([command, "one.fmu"]).fails(1, &message);
         }
     }
-    // What is no version is a mistake in the file.
+    // A value that is no version is a mistake in the file.
     let other = description("none", &[("fmiVersion=\"2.0\"", "fmiVersion=\"one\"")]);
     misbehaving::write(&workshop, "one.fmu", other, &misbehaving::library(&[]));
     let done = workshop.punctual(["validate", "one.fmu"]);
@@ -332,7 +332,7 @@ fn other_interfaces_and_versions_are_out_of_scope() {
     assert!(done.code == 1 && done.stdout.contains(finding), "{done:#?}");
 }
 
-/// Tools and people archive the folder where its content is meant.
+/// Tools and people archive the folder instead of its content.
 #[test]
 fn a_folder_around_everything_is_told() {
     let workshop = Workshop::new();

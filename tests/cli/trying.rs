@@ -1,5 +1,5 @@
-//! The trial of `punctual validate`: an FMU that misbehaves when it runs is a finding, whatever it does to its
-//! process.
+//! The trial of `punctual validate`: if an FMU misbehaves when it runs, that is a finding, whatever happens
+//! to its process.
 
 use crate::misbehaving::{self, description};
 use crate::validating::listed;
@@ -11,7 +11,7 @@ fn tried_with(defect: &str, macros: &[&str], options: &[&str]) -> (i32, Vec<Stri
     listed(&workshop, options)
 }
 
-/// Asserts that the defect makes exactly this finding (its beginning).
+/// Asserts that the defect gives exactly one finding, which begins with `expected`.
 #[track_caller]
 fn one(defect: &str, expected: &str) {
     one_with(defect, &[], expected);
@@ -73,7 +73,7 @@ fn an_fmu_that_hangs_is_stopped() {
     );
 }
 
-/// Nothing is wrong with an FMU that takes its time: fewer steps are tried.
+/// A slow FMU is no defect: fewer steps are tried.
 #[test]
 fn a_slow_fmu_is_tried_in_fewer_steps() {
     // All 21 steps would take 12.6 s.
@@ -148,7 +148,8 @@ fn answers_and_values() {
     one("one-instance", "warning trial.instances trial: a second instance beside trial fails, but");
 }
 
-/// Texts that are no formats, a conversion that writes, NULL, other encodings, terminal codes, no end.
+/// Texts that are not formats, a conversion that writes, NULL, other encodings, terminal codes, no
+/// terminator.
 #[test]
 fn odd_logs_do_no_harm() {
     let (_, found) = tried_with("odd-logs", &[], &[]);

@@ -1,11 +1,13 @@
-//! Connections between variables of other units: converted, refused or noted, and the same promise in any units.
+//! Connections between variables with different units: converted, refused or noted, and the same promise in
+//! all units.
 
 use crate::table::{Table, assert_same_bits};
 use crate::workshop::{Done, Workshop};
 
 const EXPERIMENT: &str = "[experiment]\nstop_time = 2.0\nstep_size = 0.05\n";
 
-/// A cart to be within half a metre of 1 m in 2 s, whose speed is noted in degrees for want of another angle.
+/// A cart that must be within half a metre of 1 m in 2 s. Its speed is recorded in degrees, for lack of
+/// another angle.
 const FILTER: &str = r#"
 kind = "filter"
 name = "f"
@@ -59,7 +61,7 @@ fn run(workshop: &Workshop, text: &str) -> Done {
 
 fn recorded(workshop: &Workshop, text: &str) -> (Table, String) {
     let done = run(workshop, text);
-    // Not those of what became of the promise.
+    // Without the notes on the verdict.
     let about = |line: &&str| ["units", "turn"].iter().any(|word| line.contains(word));
     let notes = done.stderr.lines().filter(about).map(|line| format!("{line}\n")).collect();
     done.success();
@@ -84,7 +86,7 @@ fn a_plant_in_other_units_is_the_same_plant() {
         assert_eq!(notes, "");
         let (centi, notes) = recorded(&workshop, &system("centi.toml", START_CENTI, order, BY_NAME));
         assert_eq!(notes, CONVERTED, "{order}");
-        // Each column in the unit of its variable, from the first row on.
+        // Each column is in the unit of its variable, from the first row on.
         for (name, factor) in [
             ("filter.goal.h", 1.0),
             ("filter.x.p", 1.0),
@@ -95,7 +97,7 @@ fn a_plant_in_other_units_is_the_same_plant() {
             ("plant.u.a", 100.0),
         ] {
             for (k, (a, b)) in si.column(name).iter().zip(centi.column(name)).enumerate() {
-                // But for round-off.
+                // Up to round-off.
                 assert!((a * factor - b).abs() <= 1e-6 * factor, "{order}, {name} in row {k}: {a}, {b}");
             }
         }
@@ -109,7 +111,7 @@ fn a_plant_in_other_units_is_the_same_plant() {
     }
 }
 
-/// Wiring of the given connections, each with more keys, and the rest by name.
+/// Wires the given connections with additional keys, and the rest by name.
 fn wired(to: &str, more: &str) -> String {
     format!("[[connection]]\nfrom = \"plant.x.p\"\nto = \"{to}\"\n{more}\n{BY_NAME}")
 }
@@ -139,7 +141,7 @@ fn what_does_not_fit_is_refused_with_both_units() {
         if what.starts_with("plant.x.p") {
             run(&workshop, &system("other.toml", "", "jacobi", &wired("filter.x.p", "")))
                 .fails(2, &format!("s.toml: connection[0]: {what}, says how it is meant"));
-            // The file says how it is meant.
+            // The file says how to read the number.
             run(&workshop, &system("other.toml", "", "jacobi", &wired("filter.x.p", "factor = 2.0")))
                 .success();
         }
@@ -179,7 +181,7 @@ fn units_that_cannot_be_compared_are_noted() {
     );
 }
 
-/// What another tool might say of the unit of p in a model description.
+/// Gives p a unit in the model description, as another tool might.
 fn declared(workshop: &Workshop, unit: &str, more: &str) {
     workshop.punctual(["build", "si.toml", "-o", "p.fmu"]).success();
     workshop.edit_fmu("p.fmu", |name, bytes| {
@@ -218,7 +220,7 @@ fn units_of_other_tools_are_read_by_definition_or_by_name() {
         )
     );
     assert_eq!(first("metre", ""), (4.0, String::new()));
-    // A definition counts, and its offset where the value is no difference.
+    // A definition takes precedence, and so does its offset if the value is not a difference.
     let defined = first("ell", "relativeQuantity=\"false\"");
     assert_eq!(
         defined,
@@ -235,7 +237,7 @@ fn units_of_other_tools_are_read_by_definition_or_by_name() {
     );
 }
 
-/// A difference of what has an offset is none of a value that is none.
+/// A difference of a quantity with an offset does not connect to an absolute value.
 fn run_refused(workshop: &Workshop) {
     declared(workshop, "ell", "relativeQuantity=\"true\"");
     let done = run(workshop, &system("p.fmu", "", "jacobi", BY_NAME));
@@ -256,7 +258,7 @@ fn packages_and_campaigns_convert_too() {
     let folder = workshop.path("ssp");
     fmi_rs::zip::extract_zip_archive(workshop.path("s.ssp"), &folder).expect("an archive");
     let ssd = workshop.text("ssp/SystemStructure.ssd");
-    // SSP converts units unless it is told not to; the transformation is the whole conversion.
+    // SSP converts units unless told otherwise; the transformation is the whole conversion.
     assert_eq!(
         ssd.matches("suppressUnitConversion=\"true\"").count(),
         ssd.matches("<ssd:Connection ").count()

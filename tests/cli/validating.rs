@@ -1,5 +1,5 @@
-//! `punctual validate` on files. A sound file passes; each defect of archive, description and library is found by
-//! its rule, at its place, with the values allowed. Nothing is run here.
+//! `punctual validate` on files. A sound file passes; each defect of archive, description and library is
+//! found by its rule, at its place, with the allowed values. Nothing is run here.
 
 use serde_json::Value;
 
@@ -33,7 +33,7 @@ pub(crate) fn listed(workshop: &Workshop, options: &[&str]) -> (i32, Vec<String>
     (done.code, list.iter().map(one).collect())
 }
 
-/// Asserts that the edit makes exactly this finding (its beginning).
+/// Asserts that the edit gives exactly one finding, which begins with `expected`.
 #[track_caller]
 fn one(from: &str, to: &str, expected: &str) {
     let found = findings(description("none", &[(from, to)]));
@@ -41,7 +41,7 @@ fn one(from: &str, to: &str, expected: &str) {
     assert!(found.len() == 1 && found[0].starts_with(&expected), "wanted {expected:?}, found {found:#?}");
 }
 
-/// Asserts that the edit makes this finding (its beginning) among others that follow from it.
+/// Asserts that the edit gives a finding that begins with `expected`, among others that follow from it.
 #[track_caller]
 fn among(from: &str, to: &str, expected: &str) {
     let found = findings(description("none", &[(from, to)]));
@@ -279,7 +279,7 @@ fn units_with_factors_that_are_none() {
     }
 }
 
-/// Attributes that belong to model exchange: refused without it, of no matter with it.
+/// Attributes for model exchange are refused without it, and ignored with it.
 #[test]
 fn attributes_of_model_exchange() {
     let reinit = ("<Real unit=\"m\" max=\"1000\"/>", "<Real unit=\"m\" max=\"1000\" reinit=\"true\"/>");
@@ -469,7 +469,7 @@ fn libraries_that_are_none_or_lack_functions() {
     assert!(cut.starts_with("error symbols."), "{cut}");
 }
 
-/// The archive of the fixture, with the compression method of every entry told as another.
+/// The archive of the fixture, with the compression method of every entry changed to another.
 #[test]
 fn entries_compressed_in_other_ways() {
     for (method, name) in [
@@ -483,7 +483,7 @@ fn entries_compressed_in_other_ways() {
         let workshop = Workshop::new();
         misbehaving::write(&workshop, "x.fmu", description("none", &[]), &misbehaving::library(&[]));
         let mut bytes = std::fs::read(workshop.path("x.fmu")).expect("the archive");
-        // The method stands in the head of an entry, and in its line of the directory.
+        // The method is in the header of an entry, and in its record in the directory.
         for (head, at) in [(b"PK\x03\x04", 8), (b"PK\x01\x02", 10)] {
             let found = bytes.windows(4).position(|four| four == head).expect("an entry");
             bytes[found + at..][..2].copy_from_slice(&method.to_le_bytes());
@@ -500,7 +500,7 @@ fn entries_compressed_in_other_ways() {
     }
 }
 
-/// An archive with this platform's library and, for another one, something else.
+/// An archive with this platform's library and something else for another platform.
 fn of_two_platforms(own: &[u8], other: &[u8], defect: &str) -> Workshop {
     let workshop = Workshop::new();
     let other_platform = if cfg!(windows) { "linux32/misbehaving.so" } else { "win32/misbehaving.dll" };
@@ -515,7 +515,7 @@ fn of_two_platforms(own: &[u8], other: &[u8], defect: &str) -> Workshop {
     workshop
 }
 
-/// What is wrong with the library of another platform does not keep this one's from being tried.
+/// A defect in the library of another platform does not prevent the trial of this one's.
 #[test]
 fn the_trial_runs_where_this_platforms_library_is_whole() {
     let (whole, broken) = (misbehaving::library(&[]), b"no library".as_slice());
@@ -523,7 +523,7 @@ fn the_trial_runs_where_this_platforms_library_is_whole() {
     let (_, found) = listed(&workshop, &[]);
     assert!(found.len() == 2 && found[0].starts_with("error symbols.readable binaries/"), "{found:#?}");
     assert!(found[1].starts_with("error trial.call trial: "), "it ran: {found:#?}");
-    // This platform's own is not run.
+    // A defective library for this platform is not run.
     for own in [broken.to_vec(), misbehaving::library(&["WITHOUT_STATE"])] {
         let workshop = of_two_platforms(&own, broken, "error-in-step");
         let done = workshop.punctual(["validate", "x.fmu"]);

@@ -1,4 +1,4 @@
-//! Goals that move, obstacles, and the finer bicycles, from configuration to CSV.
+//! Moving goals, obstacles, and the more exact bicycles, from configuration to CSV.
 
 use std::fs;
 
@@ -9,7 +9,7 @@ use crate::workshop::{Workshop, examples};
 
 const DEADLINE: f64 = 5.0;
 
-/// Builds filter and plant, couples them for 10 s with u_ref as in `connections`, returns the CSV.
+/// Builds filter and plant, couples them for 10 s with u_ref as in `connections`, and returns the CSV.
 fn coupled(model: &str, barriers: &str, x0: &str, connections: &str) -> Table {
     let workshop = Workshop::with_library();
     let experiment = "[experiment]\nstop_time = 10.0\n";
@@ -34,7 +34,7 @@ fn every_step_is_satisfied(table: &Table) {
     assert!(table.column("f.status").iter().all(|s| *s <= 1.0), "a constraint was not satisfied");
 }
 
-/// The place of the disc follows from the time, not from the filter's word for it.
+/// The position of the disc is computed from the time, not taken from the filter's outputs.
 #[test]
 fn a_point_mass_meets_a_moving_disc_and_rides_along() {
     let goal = "[[barrier]]\nname = \"goal\"\ncentre = [20.0, 5.0]\nvelocity = [3.0, 1.0]\nradius = 2.0\n\
@@ -50,7 +50,7 @@ fn a_point_mass_meets_a_moving_disc_and_rides_along() {
     }
 }
 
-/// Without the rock the way to the goal leads through it.
+/// Without the rock, the path to the goal leads through it.
 #[test]
 fn a_goal_behind_an_obstacle_that_comes_closer() {
     let goal = "[[barrier]]\nname = \"goal\"\ncentre = [20.0, 1.0]\nradius = 2.0\ndeadline = 5.0\n";
@@ -84,8 +84,9 @@ fn bicycles_steered_by_rates_keep_the_deadline() {
     }
 }
 
-/// The example of a car steered by an angle itself, and the same of a small-slip bicycle, exactly measured. Their
-/// places follow from the angle that the plant was given, which stays within its limits and those of its rate.
+/// The example of a car steered by an integrated angle, and the same with a small-slip bicycle and exact
+/// measurements. Their positions follow from the angle that the plant received, which stays within its limits
+/// and rate limits.
 #[test]
 fn bicycles_steered_by_angles_keep_the_deadline() {
     let edits: [&[(&str, &str)]; 2] = [
@@ -98,7 +99,7 @@ fn bicycles_steered_by_angles_keep_the_deadline() {
             ("x_p = 0.02", "x_p = 0.0"),
             ("y_p = 0.02", "y_p = 0.0"),
             ("v = 0.05", "v = 0.0"),
-            // The row of a bicycle vanishes across the line of sight.
+            // The row of a bicycle vanishes perpendicular to the line of sight.
             ("theta = -0.2", "theta = 0.4"),
         ],
     ];
@@ -118,15 +119,15 @@ fn bicycles_steered_by_angles_keep_the_deadline() {
         let (time, x, y) = (table.column("time"), table.column("plant.x.x_p"), table.column("plant.x.y_p"));
         let error = if edits.is_empty() { 0.02 * 2.0_f64.sqrt() } else { 0.0 };
         for k in 0..time.len() {
-            // The true distance is less than the measured one less its error; the margin is 0.05 m.
+            // The true distance is at least the measured one minus its error; the margin is 0.05 m.
             let distance = (x[k] - 20.0).hypot(y[k] - 10.0) - error;
             assert!(time[k] < DEADLINE || distance <= 2.0, "{angle}: {distance} m at {} s", time[k]);
         }
         let held = table.column(&format!("filter.u.{angle}"));
         let kept = table.column(&format!("filter.integrator.{angle}"));
         for k in 1..time.len() {
-            // From mean to mean the angle changes over half of one step and half of the next, at rates within 1
-            // rad/s.
+            // From mean to mean, the angle changes over half of one step and half of the next, at rates
+            // within 1 rad/s.
             let change = (held[k] - held[k - 1]).abs();
             assert!(held[k].abs() <= 0.7 && change <= 0.01 + 1e-12, "{} rad at {} s", held[k], time[k]);
             assert!((kept[k] - 2.0 * held[k] + kept[k - 1]).abs() <= 1e-12, "the mean of a step");
@@ -135,8 +136,8 @@ fn bicycles_steered_by_angles_keep_the_deadline() {
     }
 }
 
-/// A goal whose place comes from another FMU, past an obstacle. The leader's place follows from its own column.
-/// It does not keep its velocity, as the filter expects between samples.
+/// A goal whose position comes from another FMU, past an obstacle. The leader's position comes from its own
+/// column. It does not keep its velocity, contrary to what the filter expects between samples.
 #[test]
 fn a_goal_that_is_another_fmu() {
     let workshop = Workshop::with_library();
@@ -162,7 +163,7 @@ fn a_goal_that_is_another_fmu() {
     assert!(lead_x[time.len() - 1] < 20.0 + 3.0 * 20.0 - 15.0, "the leader brakes");
 }
 
-/// Three FMUs, wired by name alone: the controller tours its points, the filter keeps the deadline.
+/// Three FMUs, connected by name alone: the controller visits its waypoints, the filter keeps the deadline.
 #[test]
 fn a_controller_a_filter_and_a_plant() {
     let workshop = Workshop::with_library();
@@ -177,7 +178,7 @@ fn a_controller_a_filter_and_a_plant() {
     every_filter_step_is_satisfied(&table);
     let (time, h) = (table.column("time"), table.column("filter.goal.h"));
     assert!((0..time.len()).all(|k| time[k] < 10.0 || h[k] >= 0.0), "late, or left again");
-    // The vehicle came by every point, in order, and the filter reads the controller's wish.
+    // The vehicle visited every waypoint in order, and the filter reads the controller's output.
     let waypoint = table.column("controller.waypoint");
     assert!(waypoint.windows(2).all(|w| w[0] <= w[1]) && waypoint[0] == 1.0);
     assert_eq!(waypoint.last(), Some(&3.0));

@@ -1,4 +1,4 @@
-//! A folder of its own for each test, the binary under test, and the FMUs of the example.
+//! A separate folder for each test, the binary under test, and the FMUs of the example.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -14,7 +14,7 @@ pub(crate) fn examples() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/vehicles")
 }
 
-/// Result of a call of the command line.
+/// Result of a command.
 #[derive(Debug)]
 pub(crate) struct Done {
     pub(crate) code: i32,
@@ -30,24 +30,27 @@ impl Done {
         self.stdout
     }
 
-    /// Asserts a failure with this code that prints nothing but `error: ` and `message`.
+    /// Asserts a failure with this exit code that prints nothing but `error: ` and `message`.
     #[track_caller]
     pub(crate) fn fails(self, code: i32, message: &str) {
         let expected = format!("error: {message}\n");
         assert_eq!((self.code, self.stdout.as_str(), self.stderr.as_str()), (code, "", expected.as_str()));
     }
 
-    /// Asserts a failure with this code whose message starts like `begin` and contains `parts`: for
-    /// messages that the operating system or another crate words.
+    /// Asserts a failure with this exit code whose message starts with `begin` and contains `parts`: for
+    /// messages whose text comes from the operating system or another crate.
     #[track_caller]
     pub(crate) fn fails_like(self, code: i32, begin: &str, parts: &[&str]) {
         let begin = format!("error: {begin}");
-        let told = self.stderr.starts_with(&begin) && parts.iter().all(|part| self.stderr.contains(part));
-        assert!(self.code == code && self.stdout.is_empty() && told, "wanted {begin}, {parts:?}: {self:#?}");
+        let printed = self.stderr.starts_with(&begin) && parts.iter().all(|part| self.stderr.contains(part));
+        assert!(
+            self.code == code && self.stdout.is_empty() && printed,
+            "wanted {begin}, {parts:?}: {self:#?}"
+        );
     }
 }
 
-/// A temporary folder in which the command line is run, so that its messages name plain files.
+/// A temporary folder in which the command line is run, so that messages contain plain file names.
 pub(crate) struct Workshop {
     folder: TempDir,
     environment: Vec<(&'static str, String)>,
@@ -67,7 +70,7 @@ impl Workshop {
         workshop
     }
 
-    /// A workshop with `external.toml`, the example of a filter that is given the derivatives of its barriers.
+    /// A workshop with `external.toml`, the example of a filter whose barrier derivatives are inputs.
     pub(crate) fn with_external() -> Self {
         let workshop = Self::new();
         let example = examples().join("../models/external-filter.toml");
@@ -106,8 +109,8 @@ impl Workshop {
         names
     }
 
-    /// Runs `punctual` with these arguments. No variable of the caller's environment that it looks at is handed
-    /// on.
+    /// Runs `punctual` with these arguments. Variables of the caller's environment that it reads are not
+    /// passed on.
     pub(crate) fn punctual<S: AsRef<OsStr>>(&self, arguments: impl IntoIterator<Item = S>) -> Done {
         let mut command = Command::new(env!("CARGO_BIN_EXE_punctual"));
         command.args(arguments).current_dir(self.folder.path()).stdin(Stdio::null());
@@ -123,7 +126,7 @@ impl Workshop {
         }
     }
 
-    /// Rewrites the FMU `name`: `edit` gets each entry's path and bytes, and drops it with `None`.
+    /// Rewrites the FMU `name`: `edit` gets each entry's path and bytes, and drops it by returning `None`.
     pub(crate) fn edit_fmu(&self, name: &str, mut edit: impl FnMut(&str, Vec<u8>) -> Option<Vec<u8>>) {
         let unpacked = tempfile::tempdir().expect("a temporary folder");
         let path = self.path(name);
@@ -140,8 +143,8 @@ impl Workshop {
     }
 }
 
-/// The shared library without debug information where `strip` can be had. Debug information makes it ten times as
-/// large, and every FMU built or run is compressed or unpacked.
+/// The shared library, without debug information if `strip` is available. Debug information makes it ten
+/// times as large, and every FMU built or run is compressed or unpacked.
 static LIBRARY: LazyLock<Vec<u8>> = LazyLock::new(|| {
     let library = fs::read(library()).expect("the library beside the tests");
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -197,7 +200,7 @@ pub(crate) fn assert_golden(name: &str, text: &str) {
     );
 }
 
-/// `text` with every GUID replaced: it changes with each version.
+/// `text` with every GUID replaced, since it changes with each version.
 pub(crate) fn without_guids(text: &str) -> String {
     let mut parts = text.split('{');
     let mut result = parts.next().unwrap_or_default().to_owned();

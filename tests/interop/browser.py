@@ -10,7 +10,7 @@ import pytest
 
 BROWSERS = ["chromium", "chromium-browser", "google-chrome", "chrome"]
 
-# A window is at least 500 pixels wide, a frame is not. What the page leaves is copied out of it.
+# A window is at least 500 pixels wide, but a frame can be narrower. The results are copied out of the frame.
 FRAME = """<!DOCTYPE html>
 <html><body>
 <script>
@@ -27,8 +27,8 @@ const copy = (frame) => {
 
 
 def opened(text, probe, width, folder):
-    """Opens the page `text`, `width` pixels wide, with the script `probe` at its end. Returns the attributes of the document, the whole of it, and
-    what the browser says."""
+    """Opens the page `text`, `width` pixels wide, with the script `probe` appended. Returns the attributes of the document, its
+    whole text, and the browser's messages."""
     browser = next(filter(None, map(shutil.which, BROWSERS)), None)
     if browser is None:
         missing = pytest.fail if "CI" in os.environ else pytest.skip

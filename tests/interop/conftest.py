@@ -14,7 +14,7 @@ METHODS = ["repeated_root", "reference_profile"]
 
 
 def binary():
-    """The command line: PUNCTUAL or the release build."""
+    """The command line: the one in PUNCTUAL, or the release build."""
     return os.environ.get("PUNCTUAL", str(ROOT / "target" / "release" / "punctual"))
 
 
@@ -26,7 +26,7 @@ def punctual(*arguments, check=True, cwd=None):
 
 
 def for_windows(here, there):
-    """Writes the FMU `here`, built on this system, as a build on Windows would be, but for the library."""
+    """Rewrites the FMU `here`, built on this system, as if built on Windows, except for the library."""
     with zipfile.ZipFile(here) as source, zipfile.ZipFile(there, "w") as target:
         for name in source.namelist():
             content = source.read(name)
@@ -38,7 +38,7 @@ def for_windows(here, there):
 
 @pytest.fixture(scope="session")
 def sundry(tmp_path_factory):
-    """A folder with sundry.fmu, of FMI 3.0 and in C, which is not ours. It has a variable of every type, and arrays."""
+    """A folder with sundry.fmu, a foreign FMU of FMI 3.0 in C. It has a variable of every type, and arrays."""
     folder = tmp_path_factory.mktemp("sundry")
     fixtures = ROOT / "tests" / "fixtures"
     library = folder / "sundry.so"

@@ -12,9 +12,9 @@ def declared_categories(path):
 
 
 class Slave:
-    """One FMU, instantiated and initialised, its variables by name.
+    """One FMU, instantiated and initialised, with its variables by name.
 
-    `logger` gets instance name, status, category and text of every message, in all categories.
+    `logger` receives instance name, status, category and text of every message, in all categories.
     """
 
     def __init__(self, path, start=None, logger=None):
@@ -29,7 +29,7 @@ class Slave:
         )
         callbacks = None
         if logger is not None:
-            # Raw, without FMPy's proxy, which would print the text with its arguments: ours has none.
+            # Without FMPy's proxy, which would format the text with its arguments: our texts have none.
             callbacks = fmi2CallbackFunctions()
             callbacks.logger = fmi2CallbackLoggerTYPE(
                 lambda _, name, status, category, message: logger(

@@ -70,15 +70,15 @@ def test_every_column_has_its_unit_and_meaning_as_metadata(campaign):
     columns = json.loads(schema.metadata[b"punctual.columns"])
     assert [field.name for field in schema] == [column["name"] for column in columns]
     for field, column in zip(schema, columns):
-        told = {key.encode(): column[key].encode() for key in ("unit", "description") if column[key]}
-        assert field.metadata == told, field
+        expected = {key.encode(): column[key].encode() for key in ("unit", "description") if column[key]}
+        assert field.metadata == expected, field
     assert schema.field("plant.x0.v").metadata[b"unit"] == b"m/s"
     kinds = [str(schema.field(name).type) for name in ("run", "plant.x0.v", "success", "failure")]
     assert kinds == ["int64", "double", "bool", "string"]
 
 
 def bits(value):
-    """What tells every bit of a cell."""
+    """A representation that shows every bit of a cell."""
     return struct.pack("<d", value) if isinstance(value, float) else value
 
 

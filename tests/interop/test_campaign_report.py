@@ -1,4 +1,4 @@
-"""The page of `punctual campaign --report` in a real browser: it draws what the reader chooses, and fits a phone."""
+"""The page of `punctual campaign --report` in a real browser: it draws what the reader selects, and fits a phone."""
 
 import re
 
@@ -24,7 +24,7 @@ distribution = "choice"
 values = [4.0, 8.0, 12.0]
 """
 
-# Uses the page as a hand would, and leaves what it saw as attributes of the document.
+# Operates the page like a user, and stores what it saw as attributes of the document.
 PROBE = """
 <script>
 const root = document.documentElement, seen = root.dataset;
@@ -69,7 +69,7 @@ seen.filled = getComputedStyle(bars.querySelector("g path.curve")).fill;
 
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory):
-    """The folder with the page of a campaign, which `punctual new` begins."""
+    """The folder with the page of a campaign that starts from the file of `punctual new`."""
     folder = tmp_path_factory.mktemp("campaign")
     punctual("new", "car.toml", cwd=folder)
     car = (folder / "car.toml").read_text()
@@ -86,12 +86,12 @@ def test_the_reader_chooses_what_runs_are_drawn_over(campaign, width, tmp_path):
     seen, _, said = opened(page, PROBE, width, tmp_path)
     assert "CONSOLE" not in said, said
     assert seen["ready"] == "yes"
-    # Wide tables scroll in themselves: the page does not.
+    # Wide tables scroll by themselves; the page does not.
     assert int(seen["overflow"]) <= 0
     assert int(seen["marks"]) == 60
     assert int(seen["choices"]) > 3
     assert (seen["changed"], seen["named"], seen["charts"]) == ("true", "true", "1")
-    # The command that it tells makes this run again, with the row as it was recorded.
+    # The command that it shows repeats this run, with the row as it was recorded.
     assert seen["hidden"] == "true"
     run = re.fullmatch(r"punctual replay many[.]parquet --run (\d+) --out out", seen["again"])[1]
     assert seen["read"].startswith(f"run {run}, ")
@@ -99,7 +99,7 @@ def test_the_reader_chooses_what_runs_are_drawn_over(campaign, width, tmp_path):
     assert "the row is as recorded, bit for bit" in done.stdout
     assert 1 < int(seen["cells"]) <= 9 and seen["back"] == "0"
     if width > 1000:
-        # Every cell has room for its count.
+        # Every cell is large enough for its count.
         counts = [int(words.removeprefix("of ")) for words in seen["counted"].split("|")]
         assert (len(counts), sum(counts)) == (int(seen["cells"]), 60)
     assert int(seen["bars"]) >= 1

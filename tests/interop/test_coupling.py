@@ -1,4 +1,4 @@
-"""Filter and plant in a plain FMPy loop: the promise is kept, and `punctual run` gives the same."""
+"""Filter and plant in a plain FMPy loop: the promise is kept, and `punctual run` gives the same numbers."""
 
 import csv
 import itertools
@@ -21,7 +21,7 @@ PAPER = {"point_mass": (10.003, 10.005), "unicycle": (10.085, 10.090), "bicycle"
 
 @pytest.fixture(scope="module", params=[(m, k) for m in MODELS for k in METHODS], ids="-".join)
 def run(request, demo):
-    """Model, method, the rows of the FMPy loop and those that `punctual demo` wrote."""
+    """Model, method, the rows of the FMPy loop, and those that `punctual demo` wrote."""
     model, method = request.param
     folder, _ = demo
     damping = DAMPING[model] if method == "reference_profile" else {}
@@ -40,10 +40,10 @@ def test_every_variable_equals_that_of_punctual_run(run):
     for (t, values), row in zip(rows, recorded):
         assert t == row["time"]
         for name, value in values.items():
-            # The Integer twin of an enumeration is that again.
+            # The Integer twin of an enumeration has the same value.
             worst[name] = max(worst.get(name, 0.0), abs(value - row[name.removesuffix("_code")]))
     print(f"\n{model} {method}: {len(worst)} variables, {len(rows)} points, largest difference {max(worst.values())}")
-    # Both masters make the same calls with the same numbers: not even round-off is left.
+    # Both masters make the same calls with the same numbers, so not even round-off differs.
     assert max(worst.values()) == 0.0, worst
 
 
@@ -67,7 +67,7 @@ def test_h_against_its_promised_bound(run):
     model, method, rows, _ = run
     worst = min(row["filter.goal.h"] - row["filter.goal.profile"] for _, row in rows)
     if method == "repeated_root":
-        # No margin for held inputs, and an anti-stable error: the bound is broken before arrival.
+        # No margin for held inputs, and an unstable error: the bound is broken before arrival.
         assert worst < 0.0
     else:
         # Theory: held inputs cost at most M δ / a², far less than the margin of 0.02 m at 1 ms.

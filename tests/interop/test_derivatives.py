@@ -1,4 +1,4 @@
-"""Directional derivatives through FMPy, against central differences of what FMPy reads."""
+"""Directional derivatives through FMPy, compared with central differences of the values that FMPy reads."""
 
 import fmpy
 import pytest

@@ -1,4 +1,4 @@
-"""Derivatives that are inputs: valid for FMPy, and the numbers of the filter that has the model."""
+"""Derivatives as inputs: valid for FMPy, and the same numbers as the filter with the model."""
 
 import pytest
 from conftest import punctual
@@ -31,7 +31,7 @@ inputs = [{ name = "a", unit = "m/s2" }]
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
-    """The same filter twice: by expressions, and given the derivatives."""
+    """The same filter twice: with expressions, and with the derivatives as inputs."""
     folder = tmp_path_factory.mktemp("external")
     texts = {
         "own": OWN + BARRIER + 'expression = "3 - p"\n',
@@ -67,7 +67,7 @@ def test_the_numbers_of_the_filter_that_has_the_model(built):
         for fmu in [own, given]:
             fmu.doStep(k * STEP, STEP)
         a = given.getReal([g["u.a"]])[0]
-        # Both compute h and its derivatives from p and v by other operations: round-off.
+        # They compute h and its derivatives from p and v with different operations, so round-off differs.
         assert abs(a - own.getReal([o["u.a"]])[0]) <= 1e-9 * (1.0 + abs(a)), f"t = {k * STEP}"
         status = given.getInteger([g["status"]])
         assert status == own.getInteger([o["status"]])

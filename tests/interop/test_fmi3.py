@@ -1,4 +1,4 @@
-"""FMPy validates, simulates and couples our FMUs of FMI 3.0, with the numbers of those of 2.0."""
+"""FMPy validates, simulates and couples our FMUs of FMI 3.0, with the same numbers as those of 2.0."""
 
 import shutil
 import zipfile
@@ -63,7 +63,7 @@ def test_simulate_fmu_has_the_numbers_of_the_old_version(tmp_path):
         old, new = both(VEHICLES / name, tmp_path)
         known = fmpy.read_model_description(old).modelVariables
         scalars = [v.name for v in known if v.causality == "output" and v.type == "Real"]
-        # Of an array the scalars come in its order.
+        # An array becomes its scalars, in order.
         start = {}
         for prefix, values in starts.items():
             members = [v.name for v in known if v.name.startswith(f"{prefix}.")]
@@ -120,7 +120,7 @@ class Slave:
 
 
 def test_a_coupled_run_is_that_of_punctual_run(tmp_path):
-    # Two arrays are all that the filter and its plant exchange; the run of the old FMUs is by our own master.
+    # The filter and its plant only exchange two arrays. The FMUs of 2.0 are run by our own master.
     step, stop = 0.01, 2.0
     plant_file, filter_file = tmp_path / "plant.toml", tmp_path / "filter.toml"
     plant_file.write_text('kind = "plant"\nplant.model = "point_mass"\nx0 = { x_p = -20.0, v_x = 1.0 }\n')

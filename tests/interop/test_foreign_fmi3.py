@@ -1,4 +1,4 @@
-"""FMUs of FMI 3.0 whose code is not ours: one in C with a variable of every type and with arrays, and one that
+"""Foreign FMUs of FMI 3.0: one in C with a variable of every type and with arrays, and one that
 PythonFMU3 builds from a Python class. `punctual run` and FMPy must give the same numbers."""
 
 import csv
@@ -16,7 +16,7 @@ from conftest import punctual
 from test_foreign_plant import libpython
 
 STOP, STEP = 1.0, 0.1
-# FMPy computes the times of steps in another way, so that the last digit of t and h may differ.
+# FMPy computes the times of steps differently, so that the last digit of t and h may differ.
 TOLERANCE = 1e-14
 
 
@@ -34,7 +34,7 @@ def system(folder, name, start, more=""):
 
 
 def compared(folder, name, start_values, output):
-    """The largest difference between what `punctual run` wrote and what FMPy gives, by output."""
+    """The largest difference between the results of `punctual run` and of FMPy, by output."""
     found = rows(folder / "out" / f"{name}.csv")
     wanted = simulate_fmu(
         str(folder / f"{name}.fmu"),
@@ -122,8 +122,8 @@ def test_a_plant_of_pythonfmu3(tmp_path, monkeypatch):
     monkeypatch.setenv("LD_PRELOAD", str(libpython()))
     monkeypatch.setenv("PYTHONHOME", sys.base_prefix)
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(p for p in sys.path if p))
-    # The library of PythonFMU3 0.3.4 reads memory that it has freed when its process ends, which may end in an abort.
-    # What was run is written by then.
+    # When its process ends, the library of PythonFMU3 0.3.4 reads freed memory, which may cause an abort.
+    # The results are written by then.
     done = punctual("run", "lag.toml", "--out", "out", cwd=tmp_path, check=False)
     monkeypatch.undo()
     assert done.returncode in (0, -6, -11) and "written: " in done.stdout, done

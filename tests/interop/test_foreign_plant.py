@@ -1,4 +1,4 @@
-"""A plant whose code is not ours, an FMU that pythonfmu builds from a Python class, coupled with our filter
+"""A foreign plant, an FMU that pythonfmu builds from a Python class, coupled with our filter
 in FMPy and in `punctual run`."""
 
 import csv
@@ -50,7 +50,7 @@ def folder(tmp_path_factory):
 
 
 def differences(rows, wanted):
-    """The largest difference of each variable that both have."""
+    """The largest difference of each common variable."""
     assert len(rows) == len(wanted)
     names = sorted(rows[0].keys() & wanted[0].keys() - {"time"})
     assert {"plant.x.x_p", "plant.x.theta", "filter.u.a", "filter.goal.h"} <= set(names)

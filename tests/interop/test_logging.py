@@ -17,7 +17,7 @@ def test_a_session_with_every_category(demo, kind):
         slave.set({name: 0.1 for name in slave.names("input") if slave.variables[name].type == "Real"})
         slave.step(0.01 * k, 0.01)
         slave.get(slave.names("output"))
-    # Misuse is refused with a message; the session goes on.
+    # Misuse is refused with a message, and the session continues.
     with pytest.raises(FMICallException):
         slave.step(-1.0, 0.01)
     with pytest.raises(FMICallException):
@@ -33,7 +33,7 @@ def test_a_session_with_every_category(demo, kind):
         print(f"\n{name} [{category}] status {status}: {message}", end="")
     declared = declared_categories(path)
     assert sorted(declared) == ["logEvents", "logStatusError", "logStatusWarning"]
-    # Nothing to warn of: only a filter that follows plans does.
+    # There is no warning: only a filter that follows plans gives any.
     wanted = set(declared) - {"logStatusWarning"}
     assert {category for _, _, category, _ in log} == wanted, "each category was used, no other"
     assert {name for name, *_ in log} == {log[0][0]} != {""}

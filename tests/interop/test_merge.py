@@ -16,7 +16,7 @@ def test_fmpy_finds_both_platforms_and_runs_the_one_here(demo, tmp_path):
     assert f"linux64 ({here}), win64 ({there})" in done.stdout
     assert sorted(fmpy.supported_platforms(both)) == ["linux64", "win64"]
     assert validate_fmu(str(both)) == []
-    # Its own process of unpacking, loading and instantiating; the same numbers bit for bit.
+    # FMPy unpacks, loads and instantiates it on its own; the numbers are the same bit for bit.
     start = {"x0.v": 2.0, "u.omega": 0.7}
     results = [simulate_fmu(str(path), start_values=start, stop_time=1.0, output_interval=0.01) for path in (here, both)]
     assert len(results[0]) == 101

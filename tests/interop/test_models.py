@@ -1,4 +1,4 @@
-"""Models by expressions, from their configurations to FMPy's own loop."""
+"""Models given by expressions, from their configurations to FMPy's own loop."""
 
 import shutil
 
@@ -17,8 +17,8 @@ def car(tmp_path_factory):
     folder = tmp_path_factory.mktemp("car")
     for name in ["jerk-car-filter", "jerk-car-plant", "jerk-car"]:
         shutil.copy(ROOT / "examples" / "models" / f"{name}.toml", folder)
-    told = punctual("check", "jerk-car-filter.toml", "--plant", "jerk-car-plant.toml", cwd=folder).stdout
-    assert "relative degree  3" in told and "on course" in told
+    printed = punctual("check", "jerk-car-filter.toml", "--plant", "jerk-car-plant.toml", cwd=folder).stdout
+    assert "relative degree  3" in printed and "on course" in printed
     for name in ["jerk-car-filter", "jerk-car-plant"]:
         punctual("build", f"{name}.toml", "-o", f"{name}.fmu", cwd=folder)
     return folder
@@ -50,7 +50,7 @@ def test_the_fmus_are_valid(car, name):
         assert (units["u.jerk"], units["x.acc"], units["x0.v"]) == ("m/s3", "m/s2", "m/s")
 
 
-# The second place of the merge is another value of the model's parameter.
+# The second merge point is another value of the model's parameter.
 @pytest.mark.parametrize("merge", [60.0, 70.0])
 def test_the_deadline_is_kept(car, merge):
     safety, f = load(str(car / "jerk-car-filter.fmu"))
@@ -77,7 +77,7 @@ def test_the_plant_alone_is_a_polynomial(car):
     start = {"x0.v": 3.0, "x0.acc": -1.0, "u.jerk": 0.5}
     result = simulate_fmu(str(car / "jerk-car-plant.fmu"), start_values=start, stop_time=2.0, output_interval=0.01)
     t = result["time"]
-    # The classical Runge-Kutta method is exact on it: round-off of 2000 steps.
+    # The classical Runge-Kutta method is exact here, which leaves round-off of 2000 steps.
     assert abs(result["x.p"] - (3 * t - t**2 / 2 + 0.5 * t**3 / 6)).max() < 1e-11
 
 

@@ -1,4 +1,4 @@
-"""Plants alone, in FMPy's own simulation loop, against closed solutions."""
+"""Plants alone, in FMPy's own simulation loop, compared with closed-form solutions."""
 
 import math
 
@@ -51,7 +51,7 @@ def test_inner_steps_do_not_depend_on_the_communication_step(demo):
     coarse = simulate_fmu(path, start_values=start, stop_time=1.0, output_interval=0.25, step_size=0.25)
     fine = simulate_fmu(path, start_values=start, stop_time=1.0, output_interval=0.25, step_size=0.05)
     for name in ["x.x_p", "x.y_p", "x.theta", "x.v"]:
-        # The same inner steps but for round-off in how each communication step is divided.
+        # The same inner steps, up to round-off in how each communication step is divided.
         assert abs(coarse[name][-1] - fine[name][-1]) < 1e-12
 
 

@@ -1,4 +1,4 @@
-"""A model as compiled code in FMPy's own loop: the same as its expressions, bit for bit."""
+"""A model as compiled code in FMPy's own loop: bitwise the same as with expressions."""
 
 import os
 import shutil
@@ -20,7 +20,7 @@ def library(name):
 
 @pytest.fixture(scope="module")
 def cars(tmp_path_factory):
-    """Folders with the FMUs of the jerk car, once by expressions and once by a plug-in in C."""
+    """Folders with the FMUs of the jerk car, once with expressions and once with a plug-in in C."""
     folders = {}
     for kind in ["models", "plugin"]:
         folder = folders[kind] = tmp_path_factory.mktemp(kind)
@@ -35,7 +35,7 @@ def cars(tmp_path_factory):
 
 
 def drive(folder, merge):
-    """Inputs and states of a run of filter and plant that starts from the FMUs' own start."""
+    """Inputs and states of a run of filter and plant from the FMUs' own start."""
     (safety, f), (plant, p) = load(str(folder / "filter.fmu")), load(str(folder / "plant.fmu"))
     safety.setReal([f["d"]], [merge])
     for fmu in [safety, plant]:
@@ -57,7 +57,7 @@ def drive(folder, merge):
     return rows
 
 
-# The second place of the merge is another value of the plug-in's parameter.
+# The second merge point is another value of the plug-in's parameter.
 @pytest.mark.parametrize("merge", [60.0, 70.0])
 def test_the_plug_in_is_its_expressions(cars, merge):
     rows = drive(cars["plugin"], merge)
@@ -71,7 +71,7 @@ def test_the_fmus_are_valid(cars, part):
 
 
 def test_two_instances_share_a_plug_in(cars):
-    """The library stays as long as one of them needs it."""
+    """The library stays loaded as long as one of them needs it."""
     path = str(cars["plugin"] / "plant.fmu")
     (first, p), (second, _) = load(path), load(path)
     for fmu in [first, second]:

@@ -38,15 +38,15 @@ def test_an_archive_depends_on_its_files_alone(tmp_path):
 
 
 def test_licences_are_those_of_what_is_linked():
-    told = run("licences").stdout
-    listed = told.partition("=" * 80)[0].splitlines()
+    printed = run("licences").stdout
+    listed = printed.partition("=" * 80)[0].splitlines()
     crates = {line.split()[0] for line in listed if ": " in line}
     assert {"clarabel", "nalgebra", "parquet", "toml", "zip"} <= crates
-    # Tests, benches and build scripts are not inside; nor are we.
+    # Tests, benches, build scripts and our own crates are not included.
     assert not crates & {"criterion", "proptest", "cc", "punctual-core"}
     for words in ["Permission is hereby granted, free of charge", "Apache License", "Mozilla Public License"]:
-        assert words in told
-    assert "clarabel 0" in told.partition("=" * 80)[2]
+        assert words in printed
+    assert "clarabel 0" in printed.partition("=" * 80)[2]
 
 
 def test_folders_of_several_systems_are_joined(demo, tmp_path):

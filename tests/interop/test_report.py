@@ -1,11 +1,11 @@
-"""The page of `punctual reproduce` in a real browser: it draws, reads off, zooms, and fits a phone."""
+"""The page of `punctual reproduce` in a real browser: it draws, shows values, zooms, and fits a phone."""
 
 import re
 
 import pytest
 from browser import opened
 
-# Uses the page as a hand would, and leaves what it saw as attributes of the document.
+# Operates the page like a user, and stores what it saw as attributes of the document.
 PROBE = """
 <script>
 const root = document.documentElement, seen = root.dataset;
@@ -41,10 +41,10 @@ def test_the_page_works_in_a_browser(study, width, tmp_path):
     charts = len(re.findall(r'class="chart"', text))
     assert charts >= 18
     attributes, document, _ = opened(text, PROBE, width, tmp_path)
-    # Every chart is drawn by the script.
+    # The script draws every chart.
     assert attributes["ready"] == "yes"
     assert len(re.findall(r'data-drawn="[1-9]', document)) == charts
-    # Wide tables scroll in themselves: the page does not.
+    # Wide tables scroll by themselves; the page does not.
     assert int(attributes["overflow"]) <= 0
     assert re.search(r"x_p \(m\) = .*, y_p \(m\) = ", attributes["read"])
     assert (attributes["zoomed"], attributes["reset"]) == ("true", "true")

@@ -1,6 +1,6 @@
 """`punctual reproduce`: its numbers, its files, and the guide that is made from them.
 
-Here and not beside the other tests of the command line, since it takes an optimised build.
+It is separate from the other tests of the command line, since it requires an optimised build.
 """
 
 import json
@@ -13,7 +13,7 @@ NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
 def column(report, key, head, *words):
-    """The cells under `head` of table `key`, of the rows that hold all of `words`."""
+    """The cells of table `key` in column `head`, from the rows that contain all of `words`."""
     (table,) = [table for table in report["tables"] if table["key"] == key]
     index = table["header"].index(head)
     return [row[index] for row in table["rows"] if all(word in row for word in words)]
@@ -35,10 +35,10 @@ def test_the_numbers_of_a_few_runs(study):
     advised = "distance, damping"
     assert column(report, "methods", "kept until 2T", "reference profile (ours)", advised) == [runs] * 3
     assert column(report, "methods", "kept until 2T", "constricting tube", "default", advised) == [runs] * 3
-    # Without a deadline there is none to keep: a = 1 is not there by T.
+    # This method has no deadline to keep: with a = 1 it has not arrived by T.
     assert column(report, "methods", "on time", "exponential CBF", "default", advised) == [0] * 3
     assert column(report, "methods", "on time", "repeated root (the paper)", "quadratic, u_ref = 0") == [0] * 3
-    # With a plan every promise is kept, whatever u_ref is; a backup keeps what it is inside of, and is asked no more.
+    # With a plan every promise is kept, whatever u_ref is. A method with a backup keeps the set it starts in, and is asked no more.
     for method in ["plans (ours)", "gatekeeper", "backup CBF"]:
         assert set(column(report, "always", "accepted, not kept", method)) == {0}
     for vehicle in ["point mass", "unicycle", "bicycle"]:
@@ -56,7 +56,7 @@ def test_the_numbers_of_a_few_runs(study):
 
 
 def test_the_bicycles():
-    """A few starts of the table of docs/bicycle.md: the car is kept by every filter on every plant."""
+    """A few starts of the table of docs/bicycle.md: every filter keeps the car's promise on every plant."""
     done = punctual("reproduce", "--bicycles", "--quick", "--json")
     table = json.loads(done.stdout)
     head = table["header"].index
@@ -78,14 +78,14 @@ def test_a_file_for_each_table_and_picture(study):
     pictures = list(folder.glob("*.svg"))
     assert len(pictures) >= 18
     assert page.count('class="chart"') == len(pictures)
-    # It asks nobody for anything; the name of the SVG language is an address that nobody fetches.
+    # The page loads nothing; the SVG namespace is an address that is not fetched.
     assert set(re.findall(r"://([^/\"]*)", page)) == {"www.w3.org"}
     for loads in ["src=", "@import", "<link", "fetch("]:
         assert loads not in page
 
 
 def test_the_same_again(study, tmp_path):
-    """Whatever runs first: rows, pictures and page are the same to the last bit."""
+    """Rows, pictures and page are bitwise the same, whatever runs first."""
     folder, _ = study
     punctual("reproduce", "--quick", "--untimed", "--out", tmp_path)
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted(p.name for p in folder.iterdir())
@@ -94,7 +94,7 @@ def test_the_same_again(study, tmp_path):
 
 
 def test_the_guide_is_what_the_program_makes(tmp_path):
-    """Words exactly; numbers up to what another platform's `sin` and `cos` change: a pixel in a picture, a per cent or
+    """Words must match exactly, numbers up to the effect of another platform's `sin` and `cos`: a pixel in a picture, a per cent or
     two units of the last digit in a table."""
     docs = ROOT / "docs"
     shutil.copy(docs / "guide.md", tmp_path)

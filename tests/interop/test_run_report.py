@@ -1,4 +1,4 @@
-"""The page of `punctual run --report` in a real browser: it plays, is moved by its slider, and fits a phone."""
+"""The page of `punctual run --report` in a real browser: it plays, follows its slider, and fits a phone."""
 
 import re
 
@@ -6,7 +6,7 @@ import pytest
 from browser import opened
 from conftest import ROOT, punctual
 
-# Uses the page as a hand would, and leaves what it saw as attributes of the document.
+# Operates the page like a user, and stores what it saw as attributes of the document.
 PROBE = """
 <script>
 const root = document.documentElement, seen = root.dataset;
@@ -45,7 +45,7 @@ seen.paused = play.getAttribute("aria-label");
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
-    """The folder with the pages of three systems: a vehicle, one that follows another, and none."""
+    """The folder with the pages of three systems: one vehicle, one following another, and no vehicle."""
     folder = tmp_path_factory.mktemp("runs")
     for model in ["unicycle", "expressions"]:
         punctual("new", f"{model}.toml", "--model", model, cwd=folder)
@@ -65,7 +65,7 @@ def test_the_slider_moves_the_run(runs, name, width, tmp_path):
     assert "CONSOLE" not in said, said
     assert seen["ready"] == "yes"
     assert int(seen["overflow"]) <= 0
-    # Every cursor moves, and what it reads.
+    # Every cursor moves, and so do the values that it shows.
     for what in ["lines", "clock", "now"]:
         states = [seen[state + what] for state in ["first", "half", "last"]]
         assert len(set(states)) == 3, (what, states)
@@ -80,5 +80,5 @@ def test_the_slider_moves_the_run(runs, name, width, tmp_path):
     assert [len(at) for at in vehicles] == [2 if name == "escort" else 1] * 3
     assert all(len(set(places)) == 3 for places in zip(*vehicles, strict=True))
     assert int(seen["firsttrail"]) < int(seen["halftrail"]) < int(seen["lasttrail"])
-    # A goal moves where the leader does, and only there.
+    # The goal moves only in the system with a leader, as the leader does.
     assert (seen["firstgoal"] != seen["lastgoal"]) == (name == "escort")

@@ -39,7 +39,7 @@ plant = { model = "unicycle" }
 
 
 def validator():
-    """The schema, itself checked."""
+    """The schema, after checking it."""
     kind = jsonschema.validators.validator_for(SCHEMA)
     kind.check_schema(SCHEMA)
     return kind(SCHEMA)
@@ -52,7 +52,7 @@ def mistakes(text):
 
 
 def test_there_are_examples():
-    """Of what the schema looks at: systems and campaigns have no kind, and pass."""
+    """The examples include files that the schema checks; systems and campaigns have no kind, and pass."""
     assert sum("kind" in tomllib.loads(path.read_text()) for path in EXAMPLES) > 20
 
 

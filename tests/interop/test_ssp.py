@@ -70,7 +70,7 @@ def folder(tmp_path_factory):
 
 
 def valid(tree, schema):
-    """Whether a file of the package keeps to its schema of SSP 1.0."""
+    """Whether a file of the package is valid under its schema of SSP 1.0."""
     folder = os.path.join(os.path.dirname(fmpy.ssp.ssd.__file__), "schema")
     schema = etree.XMLSchema(file=os.path.join(folder, schema))
     assert schema.validate(tree), schema.error_log
@@ -136,7 +136,7 @@ def test_factors_are_transformations_and_examples_are_valid(tmp_path):
         read_ssd(str(tmp_path / f"{system}.ssp"))
         with zipfile.ZipFile(tmp_path / f"{system}.ssp") as package:
             tree = etree.parse(package.open("SystemStructure.ssd"))
-        # FMPy looks for them in another namespace than the schema has them in.
+        # FMPy looks for them in a namespace other than the schema's.
         found = tree.findall(".//ssd:Connection/ssc:LinearTransformation", namespaces=ns)
         assert [float(t.get("factor")) for t in found] == factors, system
 
@@ -148,7 +148,7 @@ def test_the_same_files_give_the_same_bytes(folder):
 
 STRUCTURE, VALUES = "SystemStructure.ssd", "resources/start_values.ssv"
 SSD, SSC, SSV = (ModelicaStandard.namespaces[name] for name in ("ssd", "ssc", "ssv"))
-# What an FMU by other people is given: numbers of every type, and arrays of one and of two dimensions.
+# Inputs of a foreign FMU: numbers of every type, and arrays of one and of two dimensions.
 GIVEN = (
     "u = [1.5, -2], m = [1, 2, 3, 4, 5, 10], in_float32 = 0.5, in_int8 = -128, in_uint8 = 255, in_int16 = -32768, "
     "in_uint16 = 65535, in_int32 = -7, in_uint32 = 4294967295, in_int64 = -9007199254740992, "
@@ -162,7 +162,7 @@ def schema2(name):
 
 
 def parts(package):
-    """The files of a package that are SSP's own, by name. Others than a structure and values we do not write."""
+    """The SSP files of a package, by name. We only write a structure and values."""
     with zipfile.ZipFile(package) as archive:
         own = [name for name in archive.namelist() if not name.endswith(".fmu")]
         assert set(own) <= {STRUCTURE, VALUES}
@@ -171,7 +171,7 @@ def parts(package):
 
 @pytest.fixture(scope="module")
 def packages2(folder, sundry, tmp_path_factory):
-    """Packages of SSP 2.0 by what is in them: arrays, scalars, every type of FMI 3.0, a factor."""
+    """Packages of SSP 2.0 by content: arrays, scalars, every type of FMI 3.0, a factor."""
     made = tmp_path_factory.mktemp("ssp2")
     for name in ["controller", "filter", "plant"]:
         punctual("build", folder / f"{name}.toml", "--fmi", "3", "-o", made / f"{name}.fmu")
@@ -200,7 +200,7 @@ def test_files_keep_to_the_schemas_of_ssp_2(packages2):
             assert root.get("version") == "2.0"
             judge = judges[name[-4:]]
             assert judge.validate(root), (package, judge.error_log)
-    # The packages have what they are to show.
+    # The packages have the content that they should test.
     structures = {name: parts(package)[STRUCTURE] for name, package in packages2.items()}
     dimensions = {name: root.findall(f".//{{{SSC}}}Dimension") for name, root in structures.items()}
     sizes = {name: [int(d.get("size")) for d in found] for name, found in dimensions.items()}
@@ -298,7 +298,7 @@ def test_pyssp_standard_reads_a_package_of_ssp_2(packages2):
         assert structure.check_connections(connector_not_in_system=True) == []
         kinds = {c.name: c.kind for c in structure.system.elements[1].connectors}
         assert (kinds["x"], kinds["u"], kinds["goal.deadline"]) == ("input", "output", "parameter")
-        # Its own judge takes the schema in XML Schema 1.1, with the start values' one inside.
+        # Its own validator uses the schema in XML Schema 1.1, which includes that of the start values.
         structure.__check_compliance__()
         [values] = package.ssv
         values.__check_compliance__()

@@ -1,4 +1,4 @@
-"""FMPy finds nothing to complain about in any FMU that we build."""
+"""FMPy finds no defect in any FMU that we build."""
 
 import zipfile
 

@@ -1,4 +1,4 @@
-"""`punctual validate` and FMPy come to the same verdict, on our FMUs and on descriptions broken one way each."""
+"""`punctual validate` and FMPy reach the same verdict on our FMUs, and on descriptions with one defect each."""
 
 import json
 import os
@@ -81,7 +81,7 @@ def library(tmp_path_factory):
 
 
 def judged(folder, fixture, library, entry, old, new, method=zipfile.ZIP_STORED, more=None):
-    """Both verdicts on an FMU with the description of the fixture, in which a text is replaced once, and more files."""
+    """Both verdicts on an FMU with the description of the fixture, in which one text is replaced, and with more files."""
     xml = (FIXTURES / fixture).read_text()
     assert old in xml
     fmu = folder / "x.fmu"
@@ -123,7 +123,7 @@ def test_ours_alone_objects(tmp_path, library, rule):
 @pytest.mark.skipif("linux-x86_64" != sysconfig.get_platform(), reason="the library is made for linux64")
 @pytest.mark.parametrize("method", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
 def test_compression(tmp_path, library, method):
-    """Python's zipfile reads more than other importers do, and FMPy says nothing to it."""
+    """Python's zipfile reads more compression methods than other importers, and FMPy does not object."""
     ours, theirs = verdicts(tmp_path, library, "", "", method)
     expected = [] if method == zipfile.ZIP_DEFLATED else ["archive.compression"]
     assert [finding["rule"] for finding in ours["findings"]] == expected and theirs == []

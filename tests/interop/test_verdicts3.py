@@ -1,4 +1,4 @@
-"""`punctual validate` and FMPy come to the same verdict on descriptions of FMI 3.0 broken one way each."""
+"""`punctual validate` and FMPy reach the same verdict on descriptions of FMI 3.0 with one defect each."""
 
 import json
 import os
@@ -105,7 +105,7 @@ BROKEN = {
     "not well-formed": ("</ModelVariables>", ""),
 }
 # Texts and their replacements to which we object, by this rule, and FMPy does not. Each is a sentence of FMI 3.0.2
-# beyond the schema that FMPy does not look at.
+# beyond the schema that FMPy does not check.
 OURS_ALONE = {
     # 2.4.1: an interface type must be there, and its modelIdentifier follows the syntax of C.
     "interface.kind": (re.compile("<ModelExchange.*/>\n  <CoSimulation.*/>"), ""),
@@ -119,7 +119,7 @@ OURS_ALONE = {
     "type.items": ('value="1"/>', 'value="0"/>'),
     "type.defined": ('name="count"', 'name="count" declaredType="Length"'),
     "log.unique": ('<Category name="logAll"/>', '<Category name="logAll"/><Category name="logAll"/>'),
-    # Times that no simulation can have.
+    # Impossible times.
     "experiment.times": ('stopTime="1"', 'stopTime="-1"'),
     # 2.4.7.2: a dimension has one of both sizes, by a structural parameter or constant of type UInt64, from 1.
     "variable.dimension": ('<Dimension start="2"/>', '<Dimension start="2" valueReference="1"/>'),
@@ -139,10 +139,10 @@ OURS_ALONE = {
         "</ModelVariables>",
         '<Float64 name="v" valueReference="70" causality="input" start="0" derivative="9"/></ModelVariables>',
     ),
-    # 2.4.8: lists without duplicates; kinds of what is no number; event indicators.
+    # 2.4.8: lists without duplicates; dependency kinds of variables that are not numbers; event indicators.
     "structure.outputs": (OUTPUT, OUTPUT + OUTPUT),
     "structure.dependencies": ('valueReference="5" dependencies="2"/>', 'valueReference="5" dependencies="2" dependenciesKind="fixed"/>'),
-    # A warning, since the standard's own Feedthrough has them: factors of what is no floating-point number.
+    # A warning, since the Reference FMU Feedthrough has them: linear kinds for variables that are not floating-point.
     "structure.kinds": (MODE, MODE.replace("dependent dependent", "dependent fixed")),
     "structure.event-indicators": ("</ModelStructure>", '<EventIndicator valueReference="12"/></ModelStructure>'),
     "structure.clocked-states": ("    <InitialUnknown", '    <ClockedState valueReference="12"/><InitialUnknown'),
@@ -377,7 +377,7 @@ class Foreign(Fmi3Slave):
 
 
 def test_an_fmu_of_another_tool(tmp_path):
-    """PythonFMU3's FMU has no error for us nor for FMPy; what we warn of is true."""
+    """PythonFMU3's FMU has no errors according to us and FMPy; our warnings are true."""
     pytest.importorskip("pythonfmu3")
     (tmp_path / "foreign.py").write_text(SLAVE)
     build = [sys.executable, "-m", "pythonfmu3", "build", "-f", "foreign.py", "--no-external-tool"]
@@ -385,7 +385,7 @@ def test_an_fmu_of_another_tool(tmp_path):
     fmu = tmp_path / "Foreign.fmu"
     ours = json.loads(punctual("validate", fmu, "--json", "--no-trial", check=False).stdout)
     assert validate_fmu(str(fmu)) == [] and ours["errors"] == 0, ours
-    # Sources without a build description, and an output that says nothing of its dependencies.
+    # Sources without a build description, and an output with undeclared dependencies.
     assert {finding["rule"] for finding in ours["findings"]} == {"archive.index", "structure.unsaid"}
     shown = json.loads(punctual("inspect", fmu, "--json").stdout)
     assert [variable["name"] for variable in shown["variables"]] == ["time", "u", "y", "k", "on"]

@@ -1,4 +1,4 @@
-"""The workflows and shell scripts, which run on other machines too, by the tools that know their mistakes."""
+"""Checks the workflows and shell scripts, which also run on other machines, with linters."""
 
 import re
 import subprocess
@@ -32,7 +32,7 @@ def test_workflows_have_the_form_of_workflows():
 
 
 def test_workflows_give_nothing_away():
-    # Actions by their commits, no more permissions than are needed, no text of others in a command.
+    # Actions are pinned to commits, permissions are minimal, and no foreign text enters a command.
     tool("zizmor", "--offline", "--quiet", "--no-progress", "--persona=auditor", *WORKFLOWS)
 
 

@@ -1,8 +1,8 @@
-//! Filters with a backup plan, by the figures that they are measured by: how many starts they accept of those that are
-//! possible, whether all that is accepted is kept, and what a step takes.
+//! Filters with a backup plan, and the figures that measure them: which fraction of the possible starts they
+//! accept, whether everything accepted is kept, and the cost of a step.
 //!
-//! Each table has a quick size for every run of the tests and a full one for `tests/nightly`. `PUNCTUAL_ASSURED`
-//! says another number of cases for any of them.
+//! Each table has a quick size for every run of the tests and a full one for `tests/nightly`.
+//! `PUNCTUAL_ASSURED` sets another number of cases for all of them.
 
 #![allow(clippy::print_stdout, reason = "the figures are read from the output")]
 
@@ -16,6 +16,6 @@ mod survival;
 
 /// Number of cases: `full` in `tests/nightly`, `quick` here.
 fn cases(quick: u64, full: u64) -> u64 {
-    let told = std::env::var("PUNCTUAL_ASSURED").ok().and_then(|n| n.parse().ok());
-    told.unwrap_or(if std::env::var_os("PUNCTUAL_TABLES").is_some() { full } else { quick })
+    let given = std::env::var("PUNCTUAL_ASSURED").ok().and_then(|n| n.parse().ok());
+    given.unwrap_or(if std::env::var_os("PUNCTUAL_TABLES").is_some() { full } else { quick })
 }

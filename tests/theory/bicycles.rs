@@ -1,11 +1,12 @@
-//! Survival of the promise where the plant is another bicycle than the filter's.
+//! How the promise holds if the plant is another bicycle than the filter's.
 
 use punctual_study::bicycles::{Model, Pairing, Remedy, Size};
 
 use super::starts::starts;
 
-/// With the car the model costs nothing. The promise of a filter for the simplified bicycle holds on the finer
-/// plants too, with the margin. So does that of filters that know them and integrate the angle themselves.
+/// For the car, the model does not matter. With the margin, the promise of a filter for the simplified
+/// bicycle also holds on the more exact plants. So does that of filters for the exact models that integrate
+/// the angle themselves.
 #[test]
 fn a_car_is_kept_by_whichever_model() {
     let starts = &starts()[..20];

@@ -36,7 +36,7 @@ impl<const N: usize> Barrier<N> for NonNegative {
 const DEADLINE: f64 = 5.0;
 const MARGIN: f64 = 0.05;
 
-/// The margin less the cost of sampling at up to 50 ms: 0.05 − 0.004.
+/// The margin minus the cost of sampling at up to 50 ms: 0.05 − 0.004.
 const LEAST_AFTER: f64 = 0.046;
 
 /// Arrival and least h after the deadline, from x₁ = −1 at rest until 2T.

@@ -1,4 +1,4 @@
-//! Disturbances that do the worst they can, with and without a bound on them in the settings.
+//! Worst-case disturbances, with and without a bound on them in the settings.
 
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::StateBound;
@@ -14,7 +14,7 @@ use super::starts::{DEADLINE, drawn};
 const STEP: f64 = 0.01;
 const MARGIN: f64 = 0.02;
 
-/// A point mass that is pushed with this many m/s² straight away from the centre of [`distance`].
+/// A point mass that is pushed with this many m/s² directly away from the centre of [`distance`].
 #[derive(Clone, Copy)]
 struct PushedAway(f64);
 
@@ -30,7 +30,7 @@ impl ControlAffine<4, 2> for PushedAway {
     }
 }
 
-/// A car steered by its jerk, of which this many m/s³ are lost.
+/// A car steered by its jerk, which loses this many m/s³.
 #[derive(Clone, Copy)]
 pub(super) struct JerkCar(pub(super) f64);
 
@@ -96,8 +96,9 @@ where
     failures
 }
 
-/// Failures from `count` starts with and without the disturbance in the settings: of a point mass that is pushed
-/// with 2 m/s² (|∇h| ≤ 1, so that is the bound on ḧ), and of a car that loses 10 m/s³ and wants to go back.
+/// Failures from `count` starts with and without the disturbance in the settings: for a point mass pushed
+/// with 2 m/s² (|∇h| ≤ 1, so that is the bound on ḧ), and for a car that loses 10 m/s³ and whose u_ref leads
+/// back.
 fn table(count: usize) -> [[Failures; 2]; 2] {
     let settings = |disturbance: f64| BarrierSettings {
         rate: Some(5.0),
@@ -119,8 +120,8 @@ fn table(count: usize) -> [[Failures; 2]; 2] {
     })
 }
 
-/// The row of the documentation: all kept with the bound in the settings, whatever pushes; without it the margin
-/// of 0.02 m is lost to 2/5² = 10/5³ = 0.08 m (lemma 3).
+/// The row of the documentation: with the bound in the settings everything is kept, whatever pushes. Without
+/// it, the margin of 0.02 m is lost to 2/5² = 10/5³ = 0.08 m (lemma 3).
 #[test]
 #[allow(clippy::print_stdout, reason = "the figures of the documentation")]
 fn table_of_disturbances_at_their_worst() {

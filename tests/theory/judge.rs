@@ -1,11 +1,11 @@
-//! A judge of its own that looks for broken promises under the flag.
+//! An independent judge that looks for broken promises under the flag.
 //!
-//! Closed loops are drawn at random ([`families`]) and run with the filter. The plant is moved by an integrator
-//! of the judge's own, from equations of its own ([`motion`], [`model`]). h is watched at all instants ([`run`]):
-//! at the ends of at least twenty parts of every hold, at the deadline itself, and at the lowest point between. A
-//! promise is broken under the flag if h < 0 in a hold at whose sample the report said `on_course`, while the
-//! set was inside at the anchor, the deadline had passed, or the phase was `Stay`. Promises that break in a hold
-//! longer than the filter was told are counted on their own.
+//! Closed loops are drawn at random ([`families`]) and run with the filter. The judge moves the plant with
+//! its own integrator and its own equations ([`motion`], [`model`]). h is checked at all instants ([`run`]):
+//! at the ends of at least twenty parts of every hold, at the deadline itself, and at the minimum in between.
+//! A promise is broken under the flag if h < 0 in a hold whose sample reported `on_course`, while the set was
+//! inside at the anchor, the deadline had passed, or the phase was `Stay`. Promises that break in a hold
+//! longer than the filter was told are counted separately.
 
 #![allow(clippy::print_stdout, reason = "the figures are read from the output")]
 
@@ -18,12 +18,12 @@ pub(crate) mod run;
 use families::Family;
 use run::{Break, run};
 
-/// Number of cases drawn, of `all`: all in `tests/nightly`, a tenth here.
+/// Number of cases drawn out of `all`: all of them in `tests/nightly`, a tenth here.
 pub(crate) fn drawn(all: usize) -> usize {
     if std::env::var_os("PUNCTUAL_TABLES").is_some() { all } else { all / 10 }
 }
 
-/// Computes `one` for each number below `count`, on every core.
+/// Computes `one` for each number below `count`, on all cores.
 pub(crate) fn on_every_core<T: Send>(count: u64, one: impl Fn(u64) -> T + Sync) -> Vec<T> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from) as u64;
     let one = &one;
@@ -55,12 +55,12 @@ struct Tally {
     unmet: usize,
     samples: usize,
     ended: usize,
-    /// Breaks under the flag: how badly, the seed, the number of the set.
+    /// Breaks under the flag: the break, the seed, the number of the set.
     worst: Vec<(Break, u64, usize)>,
 }
 
 impl Tally {
-    /// Runs the cases of `family` from the seed `first` on.
+    /// Runs the cases of `family` with seeds from `first` on.
     fn of(family: Family, first: u64, count: u64) -> Self {
         let mut tally = Self::default();
         let runs = on_every_core(count, |i| run(&family.draw(first + i)));
@@ -130,19 +130,19 @@ fn assert_none_broken(all: &[(Family, Tally)]) {
     }
 }
 
-/// Asserts that at most 5 of 500 unicycles at 50 ms lose a flag that they would have kept.
+/// Asserts that at most 5 of 500 unicycles at 50 ms lose the flag although they would have kept the promise.
 fn assert_flags_are_kept(all: &[(Family, Tally)]) {
     let (_, tally) = all.iter().find(|(family, _)| *family == Family::Fifty).expect("in the list");
     assert!(100 * tally.needless <= tally.promises, "{tally:?}");
 }
 
-/// Draws all 100,000 in `tests/nightly`; with `PUNCTUAL_JUDGE` as many per family as it says.
+/// Draws all 100,000 in `tests/nightly`; with `PUNCTUAL_JUDGE`, that many per family.
 #[test]
 fn table_of_promises() {
-    let told = std::env::var("PUNCTUAL_JUDGE").ok().and_then(|n| n.parse().ok());
+    let given = std::env::var("PUNCTUAL_JUDGE").ok().and_then(|n| n.parse().ok());
     let all = std::env::var_os("PUNCTUAL_TABLES").is_some();
-    let count = told.unwrap_or(if all { 3500 } else { 60 });
-    let found = table(count, if all || told.is_some() { 3 } else { 1 });
+    let count = given.unwrap_or(if all { 3500 } else { 60 });
+    let found = table(count, if all || given.is_some() { 3 } else { 1 });
     assert_none_broken(&found);
     assert_flags_are_kept(&found);
 }

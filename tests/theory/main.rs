@@ -1,8 +1,8 @@
-//! The figures that the documentation claims, from closed loops in process: a filter, a plant integrated by RK4
+//! Tests the figures in the documentation with closed loops in process: a filter, a plant integrated by RK4
 //! with one step per sampling period, the input held in between.
 //!
-//! All runs are of plain floating-point operations and the platform's `sin`, `cos` and `exp`. The bands are those
-//! of the figures, far above the changes by another platform's round-off.
+//! All runs use plain floating-point operations and the platform's `sin`, `cos` and `exp`. The bands are
+//! those of the figures, far wider than the changes by another platform's round-off.
 
 mod assured;
 mod bicycles;
@@ -74,8 +74,8 @@ impl Run {
     }
 }
 
-/// One barrier with these settings, sampled every `step` seconds until 2T; the repeated root without regard
-/// to the period, as in the paper.
+/// One barrier with these settings, sampled every `step` seconds until 2T. The repeated root does not account
+/// for the period, as in the paper.
 fn run<P, B>(
     plant: &P,
     barrier: B,
@@ -95,7 +95,7 @@ where
     run_as(Scheme { sampling, ..Scheme::default() }, plant, barrier, settings, nominal, step, x0)
 }
 
-/// The settings of the filter beside its barrier.
+/// The settings of the filter besides its barrier.
 #[derive(Clone, Copy, Debug)]
 struct Scheme {
     sampling: Sampling,
@@ -109,7 +109,7 @@ impl Default for Scheme {
     }
 }
 
-/// As [`run`], by this scheme.
+/// Like [`run`], with this scheme.
 fn run_as<P, B>(
     scheme: Scheme,
     plant: &P,
@@ -150,8 +150,8 @@ where
     run
 }
 
-/// The paper's table "effect of discretisation" at 1 ms; its own figures are 10.003, 10.087 and 10.256.
-/// Bands: the results of explicit Euler, semi-implicit Euler and RK4, rounded outwards.
+/// The paper's table "effect of discretisation" at 1 ms; its own figures are 10.003, 10.087 and 10.256. The
+/// bands are the results of explicit Euler, semi-implicit Euler and RK4, rounded outwards.
 #[test]
 fn the_repeated_root_arrives_late_by_what_the_paper_reports() {
     let settings = BarrierSettings { method: Method::RepeatedRoot, ..BarrierSettings::within(10.0) };
@@ -164,8 +164,9 @@ fn the_repeated_root_arrives_late_by_what_the_paper_reports() {
     check("point mass", point_mass, 10.003, 10.005);
     check("unicycle", run(&Unicycle, quadratic(), settings, coast, 1e-3, x0), 10.085, 10.090);
     check("bicycle", run(&bicycle(), quadratic(), settings, coast, 1e-3, x0), 10.253, 10.260);
-    // The effort of that shape and method, about 31,950 m/s², here in equal parts along both axes. The input grows
-    // by 40 % from one sample to the next there, so that only its size is a property of the method.
+    // The effort of that shape and method, about 31,950 m/s², here equal along both axes. The input grows by
+    // 40 % from one sample to the next there, so that only its order of magnitude is a property of the
+    // method.
     let peak = point_mass.peak_to_arrival * 2.0_f64.sqrt();
     assert!((30_000.0..34_000.0).contains(&peak), "peak {peak}");
 }

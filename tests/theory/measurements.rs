@@ -1,4 +1,4 @@
-//! Bounded errors of the measured state, with and without the settings that allow for them.
+//! Bounded errors of the measured state, with and without settings that account for them.
 
 use std::array::from_fn;
 
@@ -15,17 +15,17 @@ use super::starts::{DEADLINE, drawn, uniform};
 const STEP: f64 = 0.01;
 const MARGIN: f64 = 0.02;
 
-/// The kinds of errors of the measurement.
+/// The kinds of measurement errors.
 #[derive(Clone, Copy, Debug)]
 enum Noise {
-    /// Anywhere within the bound, again every so many samples.
+    /// Uniform within the bound, drawn again every so many samples.
     Uniform(usize),
-    /// As far as it can in these directions, one sign for each state, all the time.
+    /// At the bound all the time, with a fixed sign for each state.
     Biased,
 }
 
-/// Failures of the runs from `starts` in which the filter sees x + error, |error_i| ≤ `errors[i]`. The true state
-/// decides them. `seems(x)` has the signs of the bias with which the state looks best.
+/// Failures of the runs from `starts` in which the filter sees x + error, |error_i| ≤ `errors[i]`, judged by
+/// the true state. `seems(x)` gives the signs of the bias with which the state looks best.
 fn failures<P, B, const NX: usize, const NU: usize>(
     (plant, barrier): (P, B),
     (errors, allowed): ([f64; NX], bool),
@@ -79,7 +79,7 @@ where
     failures
 }
 
-/// Point mass and jerk car, both with a wish to leave.
+/// Point mass and jerk car, both with a u_ref that leads outwards.
 fn table(count: usize, allowed: bool, noise: Noise) -> [Failures; 2] {
     let starts = drawn(count);
     let places: Vec<_> = starts.to_vec();
@@ -96,12 +96,11 @@ fn table(count: usize, allowed: bool, noise: Noise) -> [Failures; 2] {
     [point_mass, failures(car, errors, noise, &places, |_| [1.0; 3], |_| [-20.0])]
 }
 
-/// Steps that are not met in the thousand runs of the documentation: a known defect, not one that is allowed to
-/// grow.
+/// Steps that are not met in the thousand runs of the documentation: a known defect that must not grow.
 const UNMET: usize = 43;
 
-/// A row of the documentation: none late or outside where the settings allow for the errors. The search does not
-/// meet some rows of the point mass, at kinks of the bound: 43 steps of a thousand runs.
+/// A row of the documentation: none late or outside if the settings account for the errors. The search does
+/// not meet some rows of the point mass, at kinks of the bound: 43 steps of a thousand runs.
 #[allow(clippy::print_stdout, reason = "the figures of the documentation")]
 fn check(noise: Noise, least_lost: impl Fn(usize) -> usize) {
     let count = if std::env::var_os("PUNCTUAL_TABLES").is_some() { 1000 } else { 20 };

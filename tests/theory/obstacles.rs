@@ -1,4 +1,4 @@
-//! Reach–avoid: unicycle and bicycle through ten obstacles into the goal by a deadline, inputs bounded.
+//! Reach–avoid: unicycle and bicycle through ten obstacles to the goal by a deadline, with bounded inputs.
 
 #![allow(clippy::print_stdout, reason = "the figures are read from the output")]
 
@@ -35,11 +35,11 @@ struct Run {
     /// Smallest distance from the edge of an obstacle, m; < 0 in collision.
     clearance: f64,
     arrival: Option<f64>,
-    /// Whether it was inside from the deadline until twice that.
+    /// Whether it was inside from the deadline until twice the deadline.
     kept: bool,
     /// Steps that were infeasible, and among them those in which an obstacle's constraint was not met.
     infeasible: [usize; 2],
-    /// Steps in which no input moves a barrier that should, as at the centre of the goal.
+    /// Steps in which no input moves a barrier that it should move, as at the centre of the goal.
     no_authority: usize,
     /// Whether a deadlock was reported.
     deadlocked: bool,
@@ -118,7 +118,7 @@ where
     run
 }
 
-/// Starts with room to keep clear of the obstacles: none is within reach of their speed.
+/// Starts from which it is possible to avoid the obstacles: at the initial speed, none is too close.
 pub(crate) fn feasible_starts(count: usize) -> Vec<[f64; 4]> {
     let mut starts: Vec<[f64; 4]> = drawn(4 * count)
         .into_iter()
@@ -150,7 +150,7 @@ where
 }
 
 /// No collision, and the deadline kept by all vehicles that can turn between the obstacles. The long bicycle,
-/// whose turning circle is five times as wide as an obstacle, gets stuck in front of one; that is reported.
+/// whose turning circle is five times as wide as an obstacle, gets stuck in front of one, which is reported.
 fn table(count: usize) {
     let starts = feasible_starts(count);
     let rows = [

@@ -1,4 +1,4 @@
-//! Savings by the profile of least peak: peak inputs of the hundred starts, and the earliest deadline.
+//! Savings of the profile of least peak: peak inputs of the hundred starts, and the earliest deadline.
 
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::ControlAffine;
@@ -26,8 +26,8 @@ where
     starts().iter().map(|x0| run(plant, disc, settings, nominal, STEP, *x0)).collect()
 }
 
-/// Median and 95th percentile of the peak |u₁|; every start on time and inside with both. The tail of the bicycle
-/// does not gain: where it turns hard the row decides, and not the profile.
+/// Median and 95th percentile of the peak |u₁|; every start is on time and inside with both profiles. The
+/// tail of the bicycle gains nothing: in hard turns the row determines the input, not the profile.
 #[test]
 fn low_peaks_on_the_hundred_starts() {
     let starts = starts();

@@ -1,6 +1,6 @@
-//! The README's example with everything in it drawn at random: a unicycle into a disc by a deadline, steps of
-//! 10 ms. Watched by the judge: never out after arrival; peak speed and input beside those of the least-peak
-//! profile, which from rest over D within T needs 4D/T² and passes 2D/T.
+//! The README's example with all its numbers drawn at random: a unicycle into a disc by a deadline, with
+//! steps of 10 ms. The judge checks that it never leaves after arrival, and compares peak speed and input
+//! with those of the least-peak profile, which from rest over D within T needs 4D/T² and reaches 2D/T.
 
 #![allow(clippy::print_stdout, reason = "the figures are read from the output")]
 
@@ -28,7 +28,7 @@ struct Found {
     seed: u64,
     case: Case,
     promise: Promise,
-    /// Peak speed and |a|, over those of the least-peak profile with the speed at the start.
+    /// Peak speed and |a|, relative to those of the least-peak profile with the initial speed.
     peaks: [f64; 2],
     /// Peak speed in m/s, |a| in m/s² and |ω| in rad/s.
     largest: [f64; 3],
@@ -150,14 +150,14 @@ fn table_of_the_readme_drawn_at_random() {
         );
     }
     for found in &found {
-        // Drawn bounds may not allow to stop inside: then nothing may be promised.
+        // The drawn bounds may not allow stopping inside, and then nothing may be promised.
         let stays = !found.promise.out_after_arrival || found.case.bounds[0].is_finite();
         assert!(found.promise.broken.is_none() && stays, "{found:?}");
     }
 }
 
-/// Peak speed, and the least h at a sample after the deadline, as the crate's own simulation moves the vehicle:
-/// one step of Runge-Kutta per period, which does not follow a turn by several radians.
+/// Peak speed, and the least h at a sample after the deadline, when the crate's own simulation moves the
+/// vehicle: one Runge–Kutta step per period, which does not resolve a turn by several radians.
 fn as_simulated(case: &Case) -> [f64; 2] {
     let (step, deadline, shape) = (case.step, case.sets[0].deadline, case.sets[0].shape);
     let gain = if let Reference::Damping(gain) = case.reference { gain } else { 0.0 };
@@ -180,9 +180,10 @@ fn as_simulated(case: &Case) -> [f64; 2] {
     [speed, least]
 }
 
-/// Starts from rest at the origin as the README's, with one number changed. They were thrown out of the set after
-/// their arrival, at up to 553 m/s. That takes a plant that follows turns by several radians as coarsely as the
-/// filter's prediction does. The judge's own is not thrown, but gets inputs as mad.
+/// Starts from rest at the origin as in the README, with one number changed. They were thrown out of the set
+/// after their arrival, at up to 553 m/s. That requires a plant that resolves turns by several radians as
+/// coarsely as the filter's prediction. With the judge's own plant they are not thrown out, but get equally
+/// extreme inputs.
 #[test]
 fn the_readme_with_one_number_changed() {
     let example = || goal([45.0, 45.0], 2.0, 10.0);
@@ -214,7 +215,7 @@ fn the_readme_with_one_number_changed() {
                 found.largest
             );
             assert!(!late && !out && broken.is_none(), "{name}, {step}: {found:?}");
-            // A vehicle that coasts through the disc at 9 m/s has its radius of 2 m to stop in: 20 m/s², 8 times
+            // A vehicle that coasts through the disc at 9 m/s has its radius of 2 m to stop: 20 m/s², 8 times
             // the profile's.
             let most = if case.reference == Reference::Zero { 20.0 } else { 4.0 };
             let [speed, input] = found.peaks;

@@ -1,6 +1,6 @@
-//! Promises that were found broken, each as it was found and with numbers drawn around it.
+//! Promises that were once broken, each as it was found and with numbers drawn around it.
 //!
-//! They are watched by the judge, at all instants; see there for what a promise is.
+//! The judge checks them at all instants; it defines what a promise is.
 
 #![allow(clippy::print_stdout, reason = "the figures are read from the output")]
 
@@ -34,7 +34,7 @@ fn broken(name: &str, cases: &[Case]) -> usize {
     count
 }
 
-/// A point mass at the origin that is to be kept out of a disc; u_ref = 0, 10 ms.
+/// A point mass at the origin that must avoid a disc; u_ref = 0, 10 ms.
 fn towards(velocity: [f64; 2], centre: [f64; 2], radius: f64) -> Case {
     let set = Set::keeping(disc(centre, radius, true), 5.0);
     Case::plain(Plant::PointMass, set, &[0.0, 0.0, velocity[0], velocity[1]], 0.01)
@@ -55,7 +55,7 @@ fn an_obstacle_straight_ahead() {
     assert_eq!(count, 0);
 }
 
-/// Here 536 starts collided.
+/// 536 of these starts collided.
 #[test]
 fn two_thousand_starts_outside_a_disc() {
     let mut numbers = Numbers::new(2);
@@ -115,7 +115,7 @@ fn deadlines_between_samples() {
     assert_eq!(count, 0);
 }
 
-/// Chains with derivatives of one size in units of the deadline, from outside.
+/// Chains with derivatives of similar size in units of the deadline, starting outside.
 fn chains(n: usize, count: usize, steps: Steps) -> Vec<Case> {
     let mut numbers = Numbers::new(50 + n as u64);
     let draw = |i: usize| {
@@ -140,7 +140,7 @@ fn chains(n: usize, count: usize, steps: Steps) -> Vec<Case> {
     (0..count).map(draw).collect()
 }
 
-/// Here 89, 16 and 6 of 2,000 were broken for n = 1, 2, 3.
+/// 89, 16 and 6 of 2,000 were broken for n = 1, 2, 3.
 #[test]
 fn missed_steps() {
     let found =
@@ -148,7 +148,7 @@ fn missed_steps() {
     assert_eq!(found, [0; 3]);
 }
 
-/// Here 148, 82 and 37 were broken.
+/// 148, 82 and 37 were broken.
 #[test]
 fn steps_of_every_length() {
     let found =
@@ -156,7 +156,7 @@ fn steps_of_every_length() {
     assert_eq!(found, [0; 3]);
 }
 
-/// One step of 1e-12 s switched the filter off, and a wall at 10 m was left behind.
+/// One step of 1e-12 s disabled the filter, and it drove through a wall at 10 m.
 #[test]
 fn a_very_short_step() {
     let wall = |n: usize, push: f64, steps: Steps| Case {
@@ -185,7 +185,7 @@ fn a_very_short_step() {
     assert_eq!((found, left), ([0; 3], 0));
 }
 
-/// Few samples to a deadline: h dipped between two of them, though every sample was well.
+/// Few samples before a deadline: h dipped between two of them, though it was nonnegative at every sample.
 #[test]
 fn dips_between_samples() {
     let found = [Plant::PointMass, Plant::Unicycle, Plant::Bicycle { l_r: 2.0 }].map(|plant| {
@@ -209,13 +209,13 @@ fn dips_between_samples() {
     assert_eq!(found, [0; 3]);
 }
 
-/// A barrier that was left starts over, and does not claim that it had been kept.
+/// A barrier that was left starts again, and does not claim that it was kept.
 #[test]
 fn recovery_does_not_claim_what_was_lost() {
     let mut numbers = Numbers::new(11);
     let (mut claimed, mut recovered) = (0, 0);
     for i in 0..100 {
-        // Steps longer than the filter was told of carry the state out.
+        // Steps longer than the filter was told carry the state out.
         let (n, at) = (1 + i % 2, numbers.scale(1.0, 20.0));
         let step = numbers.within(0.01, 0.1);
         let (rate, recovery) = (Some(1.0 / step), Some(numbers.within(1.0, 5.0)));
@@ -224,7 +224,7 @@ fn recovery_does_not_claim_what_was_lost() {
         let case = Case {
             reference: Reference::Outwards(push),
             steps: Steps::Missed,
-            told: false,
+            announced: false,
             seed: i as u64,
             ..Case::plain(Plant::Chain(n), set, &[0.0; 2][..n], step)
         };

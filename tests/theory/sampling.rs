@@ -69,14 +69,14 @@ fn the_hundred_starts_at_ten_milliseconds() {
     assert_close(all_keep_the_deadline(&starts(), DAMPING, over(0.01), 0.01), [7.8, 9.6, 10.0]);
 }
 
-/// All hundred were run at 1 ms for the documentation's table; a fifth of them here, for the time it takes.
+/// All hundred were run at 1 ms for the documentation's table; a fifth of them here, to save time.
 #[test]
 fn twenty_starts_at_one_millisecond() {
     all_keep_the_deadline(&starts()[..20], DAMPING, over(0.001), 0.001);
 }
 
-/// A vehicle that drives through the centre meets a row that nearly vanishes there: the bounds keep the
-/// input it is answered with small. Without bounds 1 of these 200 bicycles leaves again after arriving.
+/// A vehicle that drives through the centre meets a row that nearly vanishes there; the bounds keep the
+/// resulting input small. Without bounds, 1 of these 200 bicycles leaves again after arriving.
 #[test]
 fn a_heading_controller_and_bounds_at_fifty_milliseconds() {
     let bounded = Scheme { bounds: [60.0, 20.0], ..over(0.05) };
@@ -84,7 +84,7 @@ fn a_heading_controller_and_bounds_at_fifty_milliseconds() {
     all_keep_the_deadline(&drawn(100), HEADING, bounded, 0.05);
 }
 
-/// The documentation's table, printed; of all hundred starts in `tests/nightly`, of three here.
+/// Prints the documentation's table: for all hundred starts in `tests/nightly`, for three here.
 #[test]
 fn table_of_the_hundred_starts() {
     let all: bool = std::env::var_os("PUNCTUAL_TABLES").is_some();

@@ -1,4 +1,4 @@
-//! Random initial conditions: the 100 of the documentation's tables and others.
+//! Random initial conditions: the 100 of the documentation's tables, and others.
 
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::{BarrierSettings, Method};
@@ -19,7 +19,7 @@ pub(super) fn uniform() -> impl FnMut() -> f64 {
     starts::uniform(2507_13888)
 }
 
-/// Starts from the same box, drawn here: the figures must not hang on one file.
+/// Starts from the same box, drawn here, since the figures must not depend on one file.
 pub(super) fn drawn(count: usize) -> Vec<[f64; 4]> {
     starts::drawn(2507_13888, count)
 }
@@ -38,7 +38,7 @@ where
     starts.iter().map(|x0| run(plant, distance(), settings, nominal, STEP, *x0)).collect()
 }
 
-/// The value at `part` of the sorted peaks.
+/// The quantile `part` of the peaks.
 pub(super) fn quantile(runs: &[Run], part: f64) -> f64 {
     let mut peaks: Vec<f64> = runs.iter().map(|r| r.peak).collect();
     peaks.sort_by(f64::total_cmp);
@@ -83,9 +83,9 @@ fn other_starts_keep_the_deadline_too() {
 /// The paper's method on the same 100 starts: 23/3/3 by exactly 5.000 s, 100/100/100 by 7.5 s (the paper
 /// itself: 100/100/99), every point mass by 5.015 s.
 ///
-/// Where a vehicle turns across the line of sight the row nearly vanishes, the held input overshoots, and
-/// the run chatters: whether the unicycle of start 97 then ends inside or circling is decided by
-/// round-off. So up to two of a hundred are left to chance.
+/// If a vehicle turns perpendicular to the line of sight, the row nearly vanishes, the held input overshoots,
+/// and the run chatters. Round-off then decides whether the unicycle of start 97 ends inside or circling. So
+/// up to two of a hundred are left to chance.
 #[test]
 fn the_repeated_root_on_the_hundred_starts() {
     const CHANCE: usize = 2;

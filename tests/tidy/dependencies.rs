@@ -1,4 +1,5 @@
-//! Allowed uses: of crates by their manifests, of modules by the paths in their code.
+//! Allowed dependencies: between crates according to their manifests, between modules according to the paths
+//! in their code.
 
 use std::collections::BTreeMap;
 
@@ -74,7 +75,7 @@ fn each_heavy_dependency_belongs_to_one_crate() {
     let owners = [
         ("clarabel", &["core/Cargo.toml"][..]),
         ("quick-xml", &["modeldescription/Cargo.toml"]),
-        // One writes archives, the other reads those of others.
+        // One crate writes archives, the other reads those of other tools.
         ("zip", &["modeldescription/Cargo.toml", "cosim/Cargo.toml"]),
         ("toml", &["fmu/Cargo.toml"]),
         ("winnow", &["models/Cargo.toml"]),
@@ -83,7 +84,8 @@ fn each_heavy_dependency_belongs_to_one_crate() {
         ("object", &["cosim/Cargo.toml"]),
         ("pyo3", &["python/Cargo.toml"]),
         ("numpy", &["python/Cargo.toml"]),
-        // One reads descriptions, one compares them and checks them against the schema, one shows notes in them.
+        // One crate reads descriptions, one compares them and checks them against the schema, one shows their
+        // notes.
         ("roxmltree", &["modeldescription/Cargo.toml", "cosim/Cargo.toml", "Cargo.toml"]),
     ];
     for path in [
@@ -105,10 +107,10 @@ fn each_heavy_dependency_belongs_to_one_crate() {
     }
 }
 
-/// This file is compiled into plug-ins too: the paths in it are theirs.
+/// This file is also compiled into plug-ins, whose paths it contains.
 const FOR_PLUGINS: &str = "fmu/src/abi/plugin/punctual_model.rs";
 
-/// A crate's modules: each line uses only the lines above it, and none of its own line but itself.
+/// A crate's modules: each line uses only the lines above it, and no other module of its own line.
 struct Order {
     folder: &'static str,
     lines: Vec<Vec<String>>,
@@ -150,7 +152,7 @@ impl Order {
     }
 }
 
-/// The first names after `crate::` and, at the top of the crate's tree, after `super::`.
+/// The first names after `crate::` and, at the top level of the crate, after `super::`.
 fn used_modules(code: &Lexed, nested: bool) -> Vec<(usize, String)> {
     let tokens = code.tokens();
     let mut used = Vec::new();
@@ -164,7 +166,7 @@ fn used_modules(code: &Lexed, nested: bool) -> Vec<(usize, String)> {
             used.push((line, tokens[i + 3].1.to_owned()));
             continue;
         }
-        // A group: the names that stand directly in it, after its brace or a comma.
+        // A group: the names directly in it, after its brace or a comma.
         let mut depth = 0;
         for pair in tokens[i + 3..].windows(2) {
             match pair[0].1 {
@@ -208,7 +210,7 @@ fn modules_of_the_core_use_modules_above_them() {
     Order { folder: "core/src/", lines }.check();
 }
 
-/// The constraint sees derivatives as numbers, never a model; the program knows no barrier.
+/// The constraint sees derivatives as numbers, never a model; the quadratic program knows no barrier.
 #[test]
 fn constraints_and_programs_know_no_model() {
     for source in SOURCES.iter().filter(|s| !s.is_test()) {
@@ -265,7 +267,8 @@ fn modules_of_the_command_line_use_modules_above_them() {
     }
 }
 
-/// The modules that a crate's documentation lists, a line each; all that exist, and no other.
+/// The modules listed in a crate's documentation, one per line; the list must be complete and contain no
+/// others.
 fn documented(path: &str, module: impl FnMut(&str) -> Option<String>) -> Vec<Vec<String>> {
     let root = TEXTS.iter().find(|text| text.path == path).unwrap_or_else(|| panic!("no {path}"));
     let listed: Vec<String> = root.text.lines().filter_map(module).collect();

@@ -20,7 +20,7 @@ fn every_example_is_a_valid_configuration_or_system() {
         // Only keys before the first table count, since the plots of a system have a kind too.
         let mut top = text.text.lines().take_while(|line| !line.starts_with('['));
         let has_kind = top.any(|line| line.starts_with("kind"));
-        // A plug-in has to be compiled first: tests/cli does.
+        // A plug-in must be compiled first, which tests/cli does.
         if has_kind && text.text.contains("\nplugin = ") {
             continue;
         }
@@ -29,7 +29,7 @@ fn every_example_is_a_valid_configuration_or_system() {
             continue;
         }
         if text.text.contains("\n[campaign]\n") {
-            // The file needs the FMUs; tests/cli/campaigns.rs checks its words.
+            // The file needs the FMUs; tests/cli/campaigns.rs checks its values.
             let system =
                 text.text.lines().find_map(|line| line.strip_prefix("system = \"")?.strip_suffix('"'));
             let system = Path::new(&text.path).with_file_name(system.expect("a system file"));
@@ -37,7 +37,7 @@ fn every_example_is_a_valid_configuration_or_system() {
             continue;
         }
         let system = System::parse(&text.text).unwrap_or_else(|e| panic!("{}: {e}", text.path));
-        // Its own FMUs are built from the configurations, or classes, of the same name beside it.
+        // Its FMUs are built from the configurations, or classes, of the same name in its folder.
         let folder = Path::new(&text.path).parent().expect("a folder");
         for component in system.components() {
             let sources = ["toml", "py"].map(|end| folder.join(&component.fmu).with_extension(end));
@@ -59,7 +59,7 @@ fn blocks<'a>(markdown: &'a str, language: &str) -> Vec<&'a str> {
     parts.filter_map(|part| part.split("\n```").next()).collect()
 }
 
-/// The texts in backquotes of the row of a Markdown table that begins with `| head |`.
+/// The quoted texts of the row of a Markdown table that begins with `| head |`.
 fn quoted_in_row(markdown: &str, head: &str) -> BTreeSet<String> {
     let row = markdown.lines().find_map(|line| line.strip_prefix(&format!("| {head} |")));
     let row = row.unwrap_or_else(|| panic!("no row {head}"));
@@ -81,7 +81,7 @@ fn filter() -> Product {
     Configuration::parse(configuration).and_then(Product::new).expect("a filter")
 }
 
-/// The variables of a filter, with states and inputs by placeholder and barriers by their own part.
+/// The variables of a filter, with placeholders for states and inputs, and without the names of barriers.
 fn variables(causality: Causality) -> BTreeSet<String> {
     let product = filter();
     let of_kind = product.variables.iter().filter(|v| v.causality == causality);
@@ -121,7 +121,7 @@ fn tables_of_keys(markdown: &str) -> Vec<BTreeSet<String>> {
     markdown.split("\n| key |").skip(1).map(rows).collect()
 }
 
-/// Beginnings of files up to a key that none has, in the order of the tables of docs/configuration.md.
+/// Beginnings of files up to an unknown key, in the order of the tables of docs/configuration.md.
 const PLACES: [&str; 20] = [
     "kind = \"filter\"",
     "kind = \"filter\"\n[[barrier]]",

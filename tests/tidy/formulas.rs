@@ -1,10 +1,11 @@
-//! The formulas of the documentation, code blocks of the language `math`, are LaTeX that KaTeX sets.
+//! The formulas of the documentation, which are code blocks of the language `math`, are LaTeX that KaTeX can
+//! render.
 
 use crate::sources::{TEXTS, Text};
 
 const ENVIRONMENTS: &[&str] = &["align", "aligned", "cases"];
 
-/// Commands that the formulas use. KaTeX knows all of them: a new one is to be looked up before it is added here.
+/// Commands that the formulas use. KaTeX supports all of them; look up a new one before adding it here.
 const COMMANDS: &[&str] = &[
     "begin",
     "end",
@@ -110,7 +111,7 @@ fn defect(formula: &str) -> Option<String> {
         }
         let length = after.find(|c: char| !c.is_ascii_alphabetic()).unwrap_or(after.len());
         let command = &after[..length];
-        // A command of one sign, such as a space.
+        // A command of one character, such as a space.
         rest = if length == 0 { after.get(1..).unwrap_or_default() } else { &after[length..] };
         let argument = rest.strip_prefix('{').and_then(|a| a.split('}').next()).unwrap_or_default();
         match command {
@@ -179,7 +180,8 @@ fn defects_are_found() {
     assert_eq!(found, [(2, "a".to_owned()), (5, "b".to_owned())]);
 }
 
-/// The header that sets them is the one that docs.rs and docs/rustdoc give to rustdoc, and what it loads is pinned.
+/// The header that renders them is the one that docs.rs and docs/rustdoc pass to rustdoc, and what it loads
+/// is pinned.
 #[test]
 fn the_header_is_named_and_pinned() {
     let text =

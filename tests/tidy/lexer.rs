@@ -1,18 +1,18 @@
-//! Rust source taken apart as far as the rules need it: code without comments and literals, and the
-//! string literals by themselves.
+//! Splits Rust source as far as the rules need it: into code without comments and literals, and the string
+//! literals.
 
-/// One source file taken apart.
+/// One source file, split.
 pub(crate) struct Lexed {
-    /// The source with every comment gone and every string and character literal emptied; lines
-    /// are as in the file.
+    /// The source with every comment removed and every string and character literal emptied; the line numbers
+    /// are those of the file.
     pub(crate) code: String,
-    /// The contents of the string literals as written, escapes and all, each with its line.
+    /// The contents of the string literals as written, including escapes, each with its line.
     pub(crate) strings: Vec<(usize, String)>,
 }
 
 impl Lexed {
-    /// The words (identifiers, keywords, numbers) and single other characters of the code, blanks
-    /// left out, each with its line.
+    /// The words (identifiers, keywords, numbers) and single other characters of the code, without blanks,
+    /// each with its line.
     pub(crate) fn tokens(&self) -> Vec<(usize, &str)> {
         let mut tokens = Vec::new();
         for (number, line) in self.code.lines().enumerate() {
@@ -41,7 +41,7 @@ impl Lexed {
     }
 }
 
-/// Takes `source` apart.
+/// Splits `source`.
 pub(crate) fn lex(source: &str) -> Lexed {
     let bytes = source.as_bytes();
     let mut lexed = Lexed { code: String::with_capacity(source.len()), strings: Vec::new() };
@@ -75,12 +75,12 @@ pub(crate) fn lex(source: &str) -> Lexed {
     lexed
 }
 
-/// The number of the line that comes next.
+/// The number of the next line.
 fn line(code: &str) -> usize {
     1 + code.bytes().filter(|b| *b == b'\n').count()
 }
 
-/// Goes from `from` to `to`, keeping the line breaks on the way.
+/// Advances from `from` to `to`, keeping the line breaks in between.
 fn keep_lines(code: &mut String, source: &str, from: usize, to: usize) -> usize {
     let to = to.min(source.len());
     code.extend(source[from..to].chars().filter(|c| *c == '\n'));
@@ -116,7 +116,7 @@ fn raw_string(rest: &str) -> Option<(usize, usize, usize)> {
     Some((open, length, open + length + end.len()))
 }
 
-/// The length of a literal up to the closing `quote`, over escapes.
+/// The length of a literal up to the closing `quote`, skipping escapes.
 fn literal(bytes: &[u8], quote: u8) -> usize {
     let mut at = 0;
     while at < bytes.len() && bytes[at] != quote {
@@ -125,7 +125,7 @@ fn literal(bytes: &[u8], quote: u8) -> usize {
     at
 }
 
-/// Whether the quote at the start of `rest` opens a character literal and not a lifetime.
+/// Whether the quote at the start of `rest` opens a character literal, not a lifetime.
 fn is_character(rest: &str) -> bool {
     let mut chars = rest.chars().skip(1);
     match (chars.next(), chars.next()) {

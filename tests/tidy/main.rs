@@ -1,5 +1,5 @@
-//! The repository's own rules: which crate and module may use which, where unsafe code and printing
-//! stand, that examples parse, that formulas can be set, that references lead somewhere, that documents agree
+//! The repository's own rules: which crate and module may use which, where unsafe code and printing are
+//! allowed, that examples parse, that formulas can be rendered, that references resolve, that documents agree
 //! with the program and versions with each other. Each rule is one test.
 
 mod dependencies;

@@ -1,4 +1,4 @@
-//! Things that must stand in one place only, and things that must stand nowhere.
+//! Things that are allowed in one place only, and things that are allowed nowhere.
 
 use crate::sources::{SOURCES, TEXTS, crates};
 
@@ -41,7 +41,7 @@ fn only_one_module_prints() {
     for source in crates().filter(|s| s.path != "src/output.rs") {
         for tokens in words.iter().chain(&streams) {
             let mut lines = source.lexed.lines_with(tokens);
-            // The output that a child process may print is a method of its command.
+            // Whether a child process may print is set by a method of its command.
             let methods = source.lexed.lines_with(&[&["."], *tokens].concat());
             lines.retain(|line| !methods.contains(line));
             assert!(lines.is_empty(), "{}: {} in lines {lines:?}", source.path, tokens[0]);
@@ -49,8 +49,8 @@ fn only_one_module_prints() {
     }
 }
 
-/// Importers print log texts with `printf`, some with the text as its format. Messages of the core reach
-/// the log too.
+/// Importers print log texts with `printf`, some using the text as the format. Messages of the core reach the
+/// log too.
 #[test]
 fn no_text_of_the_library_holds_a_percent_sign() {
     let folders = ["fmu/src/", "core/src/", "reference/src/", "models/src/"];
@@ -70,7 +70,7 @@ fn identifiers_are_ascii() {
     }
 }
 
-/// A test may be left to another one that runs it in a separate process, and says so.
+/// A test may be left to another one that runs it in a separate process, and must say so.
 #[test]
 fn no_test_is_ignored() {
     for source in &*SOURCES {
@@ -92,7 +92,7 @@ fn nothing_is_left_undone() {
             assert!(lines.is_empty(), "{}: {} in lines {lines:?}", source.path, tokens.concat());
         }
     }
-    // Put together here, so that this file does not hold them.
+    // Concatenated here, so that this file does not contain them.
     for word in [concat!("FIX", "ME"), concat!("TO", "DO"), concat!("XX", "X:")] {
         for text in &*TEXTS {
             assert!(!text.text.contains(word), "{} holds {word}", text.path);
@@ -102,7 +102,7 @@ fn nothing_is_left_undone() {
 
 #[test]
 fn no_file_names_a_place_on_one_machine() {
-    // Put together here, so that this file does not hold them.
+    // Concatenated here, so that this file does not contain them.
     for place in [concat!("/ro", "ot/"), concat!("/wo", "rk/"), concat!("/ho", "me/")] {
         for text in &*TEXTS {
             let line = text.text.lines().position(|line| line.contains(place));

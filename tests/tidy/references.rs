@@ -1,4 +1,4 @@
-//! References lead somewhere: links to a part of a document, and the numbers and labels of docs/theory.md.
+//! References resolve: links to a part of a document, and the numbers and labels of docs/theory.md.
 
 use std::collections::BTreeSet;
 use std::path::{Component, Path};
@@ -9,7 +9,7 @@ fn text(path: &str) -> &'static str {
     &TEXTS.iter().find(|t| t.path == path).unwrap_or_else(|| panic!("no {path}")).text
 }
 
-/// The lines of a Markdown text outside of code blocks, each with its number.
+/// The lines of a Markdown text outside code blocks, each with its number.
 fn lines(markdown: &str) -> Vec<(usize, &str)> {
     let mut inside = false;
     let mut lines = Vec::new();
@@ -35,12 +35,12 @@ fn slug(heading: &str) -> String {
     kept.flat_map(char::to_lowercase).map(|c| if c == ' ' { '-' } else { c }).collect()
 }
 
-/// The anchor that a line gives: `<a id="NAME"></a>`.
+/// The anchor that a line defines: `<a id="NAME"></a>`.
 fn own_anchor(line: &str) -> Option<&str> {
     line.strip_prefix("<a id=\"")?.strip_suffix("\"></a>")
 }
 
-/// The anchors of a Markdown text: its own, and those of its headings.
+/// The anchors of a Markdown text: explicit ones, and those of its headings.
 fn anchors(markdown: &str) -> Vec<String> {
     let of_line =
         |(_, line): &(usize, &str)| heading(line).map(slug).or_else(|| own_anchor(line).map(str::to_owned));
@@ -66,7 +66,7 @@ fn number(text: &str) -> Option<usize> {
     if parts { None } else { text[..end].parse().ok() }
 }
 
-/// The label in parentheses that a text begins with: a capital letter, or a number of at most two digits.
+/// The label in parentheses at the beginning of a text: a capital letter, or a number of at most two digits.
 fn label(text: &str) -> Option<&str> {
     let (label, _) = text.strip_prefix('(')?.split_once(')')?;
     let letter = label.len() == 1 && label.bytes().all(|b| b.is_ascii_uppercase());
@@ -74,13 +74,13 @@ fn label(text: &str) -> Option<&str> {
     (letter || number).then_some(label)
 }
 
-/// The labels that the formulas of a text have: `\tag{L}`.
+/// The labels of the formulas in a text: `\tag{L}`.
 fn tags(text: &str) -> impl Iterator<Item = &str> {
     text.split(r"\tag{").skip(1).map(|part| part.split('}').next().unwrap_or_default())
 }
 
 impl Numbers {
-    /// Reads the numbers as they are given: `## 1. …`, `**Lemma 1…`, and `\tag{L}` in a formula.
+    /// Collects the numbers from `## 1. …`, `**Lemma 1…`, and `\tag{L}` in a formula.
     fn of(markdown: &str) -> Self {
         let equations = tags(markdown).map(str::to_owned).collect();
         let mut numbers = Self { equations, ..Self::default() };
@@ -97,8 +97,8 @@ impl Numbers {
         numbers
     }
 
-    /// References of a text to parts that are not there. `loose` labels count too: those without a word before
-    /// them.
+    /// References in a text to parts that do not exist. With `loose`, labels without a word before them count
+    /// too.
     fn missing(&self, text: &str, loose: bool) -> Vec<String> {
         let words: Vec<&str> = text.split_whitespace().collect();
         let mut missing = Vec::new();
@@ -116,7 +116,7 @@ impl Numbers {
             if kind != "section" && !STATEMENTS.contains(&kind) || !loose && i > 0 {
                 continue;
             }
-            // "sections 2 to 6 and 8": words and numbers, as long as they follow one another.
+            // "sections 2 to 6 and 8": consecutive words and numbers.
             let mut referred = Vec::new();
             for next in &words[i + 1..] {
                 match number(next) {
@@ -186,7 +186,7 @@ fn references_to_the_theory_exist() {
     assert!(seen > 10, "{seen} references to docs/theory.md");
 }
 
-/// Every label in the documentation of the sources has the same label in docs/theory.md.
+/// Every label in the documentation of the sources exists in docs/theory.md.
 #[test]
 fn labels_of_the_sources_are_those_of_the_theory() {
     let theory = theory();
@@ -204,7 +204,7 @@ fn labels_of_the_sources_are_those_of_the_theory() {
     assert!(seen > 0, "no formula of the sources has a label");
 }
 
-/// The path of a link from the document at `from`, from the root; forward slashes.
+/// The path of a link from the document at `from`, relative to the root; forward slashes.
 fn resolved(from: &str, target: &str) -> String {
     if target.is_empty() {
         return from.to_owned();

@@ -1,5 +1,5 @@
-//! The tables of docs/configuration.md and the schema for editors, made of the tables that files are read with.
-//! With `PUNCTUAL_UPDATE_GOLDEN=1` both are written; read the difference before committing it.
+//! The tables of docs/configuration.md and the schema for editors, generated from the tables that files are
+//! read with. With `PUNCTUAL_UPDATE_GOLDEN=1` both are written; read the difference before committing it.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -13,7 +13,7 @@ use crate::sources::root;
 const DOCUMENT: &str = "docs/configuration.md";
 const SCHEMA: &str = "docs/punctual.schema.json";
 
-/// Compares a file with what it should be, or writes it.
+/// Compares a file with its wanted content, or writes it.
 fn assert_generated(path: &str, wanted: &str) {
     let file = root().join(path);
     if std::env::var_os("PUNCTUAL_UPDATE_GOLDEN").is_some() {
@@ -28,7 +28,7 @@ fn assert_generated(path: &str, wanted: &str) {
     );
 }
 
-/// The end of a range in words, unless it stands for no end.
+/// The end of a range as text, if there is one.
 fn ends(range: Range) -> Option<&'static str> {
     let bounded = |end: Option<f64>| end.is_some_and(|end| end.abs() < UNBOUNDED);
     match range {
@@ -39,7 +39,7 @@ fn ends(range: Range) -> Option<&'static str> {
     }
 }
 
-/// The kind of a value, in front of its meaning.
+/// The kind of a value, before its meaning.
 fn kind(value: Value) -> String {
     let number = |unit: Unit, range: Range| {
         let unit = match unit {
@@ -90,7 +90,7 @@ fn table_of_shapes() -> String {
     format!("| shape | h ≥ 0 is | needs | may have |\n|---|---|---|---|\n{}", rows.collect::<String>())
 }
 
-/// `document` with each table below `<!-- table: NAME -->` as the sections give it.
+/// `document` with the table of the sections below each `<!-- table: NAME -->`.
 fn with_tables(document: &str) -> String {
     let mut parts = document.split("<!-- table: ");
     let mut text = parts.next().unwrap_or_default().to_owned();
@@ -168,7 +168,7 @@ fn schema_of_value(value: Value) -> Json {
     }
 }
 
-/// The default as a value, where it is one.
+/// The default as a value, if it is one.
 fn default_value(key: &Key) -> Option<Json> {
     let text = key.default?.trim_matches('`');
     let value: Json = serde_json::from_str(text).unwrap_or_else(|_| json!(text));
@@ -200,7 +200,7 @@ fn schema_of_section(section: &Section) -> Json {
     json!({ "type": "object", "properties": properties, "required": required, "additionalProperties": false })
 }
 
-/// For each shape the keys that it needs, and those that it cannot have.
+/// For each shape, the keys that it needs and those that it forbids.
 fn conditions_of_shapes() -> Vec<Json> {
     let keys =
         |of: &dyn Fn(&ShapeRow) -> Vec<&'static str>| SHAPES.iter().flat_map(of).collect::<BTreeSet<_>>();
@@ -223,7 +223,7 @@ fn schema() -> Json {
     definitions["barrier"]["allOf"] = json!(conditions_of_shapes());
     definitions["filter"]["properties"]["barrier"]["minItems"] = json!(1);
     definitions["filter"]["properties"]["barrier"]["maxItems"] = json!(MAX_ROWS);
-    // A barrier along a vehicle that gives neither is a disc.
+    // A barrier along a named vehicle that gives neither is a disc.
     definitions["filter"]["allOf"] = json!([{
         "if": { "properties": { "plant": { "required": ["model"] } } },
         "then": { "properties": { "barrier": { "items": {
@@ -238,9 +238,9 @@ fn schema() -> Json {
             "then": definition(kind),
         })
     };
-    // Editors complete along `anyOf`, whose last branch takes every file; `allOf` finds the defects.
+    // Editors complete along `anyOf`, whose last branch accepts every file; `allOf` finds the defects.
     let branches: Vec<_> = kinds.into_iter().map(definition).chain([json!({})]).collect();
-    // Systems and campaigns, which have no kind, pass unseen.
+    // Systems and campaigns, which have no kind, pass unchecked.
     let others = json!([{ "required": ["component"] }, { "required": ["campaign"] }]);
     json!({
         "$schema": "http://json-schema.org/draft-07/schema#",

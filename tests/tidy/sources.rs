@@ -18,19 +18,19 @@ pub(crate) struct Text {
     pub(crate) text: String,
 }
 
-/// A Rust file, taken apart.
+/// A Rust file, split by the lexer.
 pub(crate) struct Source {
     pub(crate) path: String,
     pub(crate) lexed: Lexed,
 }
 
 impl Source {
-    /// Whether it is compiled for tests only.
+    /// Whether it is compiled only for tests.
     pub(crate) fn is_test(&self) -> bool {
         self.path.contains("tests/") || self.path.ends_with("/tests.rs")
     }
 
-    /// Its code and strings without the test module at its end, if it has one.
+    /// Its code and strings, without the test module at its end.
     pub(crate) fn without_tests(&self) -> Lexed {
         let code = self.lexed.code.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default().to_owned();
         let lines = code.lines().count();
@@ -39,7 +39,7 @@ impl Source {
     }
 }
 
-/// Every text file, but for what is built or installed.
+/// Every text file, except what is built or installed.
 pub(crate) static TEXTS: LazyLock<Vec<Text>> = LazyLock::new(|| {
     let mut texts = Vec::new();
     walk(root(), &mut texts);
@@ -78,7 +78,7 @@ fn walk(folder: &Path, texts: &mut Vec<Text>) {
     for entry in fs::read_dir(folder).expect("a readable folder") {
         let path: PathBuf = entry.expect("a readable entry").path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        // Skipped: folders that .gitignore names, and the repository's own data.
+        // Skipped: folders listed in .gitignore, and the repository's own data.
         let skipped =
             ["target", ".venv", ".venv-release", "_bin", "out", "__pycache__", ".pytest_cache", ".git"];
         if skipped.contains(&&*name) || path.is_symlink() {

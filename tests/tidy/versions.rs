@@ -1,4 +1,4 @@
-//! One version: that of the workspace, wherever a version of ours stands.
+//! There is one version, that of the workspace, wherever a version of ours occurs.
 
 use std::collections::BTreeMap;
 
@@ -7,13 +7,13 @@ use serde::Deserialize;
 
 use crate::sources::TEXTS;
 
-/// The version of the workspace, which this test has from its own manifest.
+/// The version of the workspace, which this test gets from its own manifest.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 #[derive(Deserialize)]
 #[serde(untagged)]
 enum Dependency {
-    /// Another's.
+    /// That of another package.
     Version(String),
     Table {
         path: Option<String>,
@@ -41,7 +41,7 @@ fn text(path: &str) -> &'static str {
     &TEXTS.iter().find(|t| t.path == path).unwrap_or_else(|| panic!("no {path}")).text
 }
 
-/// Publishing a crate needs the version that it depends on, so the table repeats it.
+/// Publishing a crate requires the version of its dependencies, so the table repeats it.
 #[test]
 fn the_workspace_has_one_version() {
     let root: Root = read_toml(text("Cargo.toml")).expect("a manifest");
@@ -60,7 +60,7 @@ fn the_workspace_has_one_version() {
     assert!(ours >= 4, "{ours} crates of the workspace in its table");
 }
 
-/// A manifest says that it takes the version of the workspace, or is that of a tool of the tests.
+/// A manifest either inherits the version of the workspace, or belongs to a tool of the tests.
 #[test]
 fn no_other_manifest_has_a_version_of_its_own() {
     let manifests = TEXTS.iter().filter(|t| {
@@ -98,7 +98,7 @@ fn the_lock_file_has_this_version() {
 fn what_is_cited_has_this_version() {
     let cited = text("CITATION.cff").lines().filter_map(|line| line.strip_prefix("version: "));
     assert_eq!(cited.collect::<Vec<_>>(), [VERSION], "CITATION.cff");
-    // With the date of its release, once it has one.
+    // With the date of its release, if it has one.
     let dated = text("CITATION.cff").lines().find_map(|line| line.strip_prefix("date-released: "));
     let newest = text("CHANGELOG.md").lines().find_map(|line| line.strip_prefix("## ")).expect("a version");
     let date = newest.split_once("] - ").map(|(_, date)| date).filter(|date| is_date(date));

@@ -1,7 +1,8 @@
-//! The schema of the rows as Apache Arrow writes it into a Parquet file. Readers such as pyarrow take from it what Parquet
-//! itself has no place for: the unit and the meaning of each column. Only this file names flatbuffers and base64.
+//! The Arrow schema of the rows, as Apache Arrow stores it in a Parquet file. Readers such as pyarrow take
+//! from it what Parquet itself cannot hold: the unit and the meaning of each column. Only this file uses
+//! flatbuffers and base64.
 //!
-//! The tables and their fields are those of `Schema.fbs` and `Message.fbs` of the format, version 5, by their numbers.
+//! The field numbers of the tables are those of `Schema.fbs` and `Message.fbs` of the format, version 5.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -9,10 +10,10 @@ use flatbuffers::{FlatBufferBuilder, TableFinishedWIPOffset, VOffsetT, WIPOffset
 
 use super::table::{Column, Kind};
 
-/// The name of the schema in the metadata of the file.
+/// The key of the schema in the metadata of the file.
 pub(super) const KEY: &str = "ARROW:schema";
 
-/// Before a message: that its length follows.
+/// The marker at the start of a message: the length follows.
 const CONTINUATION: [u8; 4] = [0xff; 4];
 /// `MetadataVersion.V5`.
 const VERSION: i16 = 4;
@@ -26,7 +27,8 @@ const fn slot(n: VOffsetT) -> VOffsetT {
     4 + 2 * n
 }
 
-/// The schema of `columns`, as the metadata have it. Readers that find one take the other `texts` of the file from it too.
+/// The schema of `columns`, encoded for the metadata. Readers that find a schema also take the file's other
+/// `texts` from it.
 pub(super) fn schema(columns: &[Column], texts: &[(String, String)]) -> String {
     let mut to = FlatBufferBuilder::new();
     let texts: Vec<_> = texts.iter().map(|(key, text)| pair(&mut to, key, text)).collect();
@@ -38,7 +40,7 @@ pub(super) fn schema(columns: &[Column], texts: &[(String, String)]) -> String {
     to.push_slot_always(slot(2), texts);
     let schema = to.end_table(table);
     let table = to.start_table();
-    // From the largest to the smallest, so that each lies where its size wants it.
+    // From the largest to the smallest, so that each is aligned to its size.
     to.push_slot_always(slot(3), 0_i64);
     to.push_slot_always(slot(2), schema);
     to.push_slot_always(slot(0), VERSION);

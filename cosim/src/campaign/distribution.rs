@@ -1,4 +1,4 @@
-//! `[vary]`: the distribution of one number, as a function from (0, 1) to values.
+//! `[vary]`: the distribution of one number, as a function from (0, 1) to its values.
 
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 use std::fmt;
@@ -8,7 +8,7 @@ use punctual_fmu::configuration::{ConfigurationError, Range};
 use serde::Deserialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// `[vary."component.variable"]`: the keys that its `distribution` needs, and no other.
+/// `[vary."component.variable"]`. Only the keys of the chosen `distribution` are allowed.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VarySection {
@@ -16,19 +16,19 @@ pub struct VarySection {
     distribution: DistributionName,
     /// Least value, in the unit of the variable.
     min: Option<f64>,
-    /// Greatest value, likewise.
+    /// Greatest value, in the same unit.
     max: Option<f64>,
-    /// Mean of the normal distribution before it is cut off at `min` and `max`, likewise.
+    /// Mean of the normal distribution before it is truncated to [min, max], in the same unit.
     mean: Option<f64>,
-    /// Standard deviation before the cut, likewise, > 0.
+    /// Standard deviation before truncation, in the same unit, > 0.
     deviation: Option<f64>,
-    /// The values to choose from, each as likely as the others; of a sequence one after the other.
+    /// The values to choose from, all equally likely. A sequence takes them one after the other.
     values: Option<Vec<f64>>,
-    /// Time in s for which a value of a sequence lasts, > 0.
+    /// Duration in s of each value of a sequence, > 0.
     period: Option<f64>,
 }
 
-/// The distributions, as the file spells them.
+/// The distributions, by their names in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum DistributionName {
@@ -41,7 +41,7 @@ enum DistributionName {
 }
 
 impl DistributionName {
-    /// Its name, the keys it must have and those it may have.
+    /// Its name, the keys it requires and the keys it allows.
     fn keys(self) -> (&'static str, &'static [&'static str], &'static [&'static str]) {
         match self {
             Self::Uniform => ("uniform", &["min", "max"], &[]),
@@ -64,31 +64,31 @@ pub enum Distribution {
         /// Greatest value.
         max: f64,
     },
-    /// Its logarithm is uniform between those of two positive numbers.
+    /// The logarithm is uniform between the logarithms of two positive numbers.
     LogUniform {
         /// Least value.
         min: f64,
         /// Greatest value.
         max: f64,
     },
-    /// Normal, cut off outside [min, max].
+    /// Normal, truncated to [min, max].
     Normal {
-        /// Mean before it is cut off.
+        /// Mean before truncation.
         mean: f64,
-        /// Standard deviation before it is cut off, > 0.
+        /// Standard deviation before truncation, > 0.
         deviation: f64,
-        /// Least value, may be −∞.
+        /// Least value; may be −∞.
         min: f64,
-        /// Greatest value, may be ∞.
+        /// Greatest value; may be ∞.
         max: f64,
     },
-    /// Picks one of these, each as likely as the others.
+    /// Picks one of these; all are equally likely.
     Choice(Vec<f64>),
-    /// The same in every run: these values one after the other, from the start on; the last one stays.
+    /// The same in every run: takes these values one after the other from the start, and keeps the last one.
     Sequence {
         /// The values, at least one.
         values: Vec<f64>,
-        /// Time in s for which each lasts, > 0.
+        /// Duration of each value in s, > 0.
         period: f64,
     },
     /// The run's own seed.
@@ -96,10 +96,10 @@ pub enum Distribution {
 }
 
 impl VarySection {
-    /// Checks the section for a variable of this range; errors are about `field`.
+    /// Checks the section for a variable with this range; errors name `field`.
     pub(super) fn checked(&self, field: &str, range: Range) -> Result<Distribution, ConfigurationError> {
         let wrong = |key: &str, message: String| ConfigurationError::new(format!("{field}.{key}"), message);
-        // The keys are those of the distribution.
+        // Only the keys of this distribution are allowed.
         let (name, needed, allowed) = self.distribution.keys();
         let numbers = [
             ("min", self.min),
@@ -183,7 +183,7 @@ impl VarySection {
             }
         }
         let (min, max) = (self.min.unwrap_or(f64::NEG_INFINITY), self.max.unwrap_or(f64::INFINITY));
-        // With a smaller part, round-off loses the part between the ends.
+        // With a smaller probability, round-off would dominate the interval.
         if below((max - mean) / deviation) - below((min - mean) / deviation) < LEAST_PART {
             let message =
                 format!("is {mean}: less than {LEAST_PART} of the distribution is from {min} to {max}");
@@ -193,7 +193,7 @@ impl VarySection {
     }
 }
 
-/// The distribution in words, without its unit.
+/// The distribution as text, without its unit.
 impl fmt::Display for Distribution {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -222,11 +222,11 @@ impl fmt::Display for Distribution {
     }
 }
 
-/// The least part of a normal distribution that the ends may leave of it.
+/// The least probability that the interval of a truncated normal distribution may have.
 const LEAST_PART: f64 = 1e-9;
 
 impl Distribution {
-    /// The value at `u` in (0, 1), rising with `u`, in a run whose own seed is `seed`.
+    /// The value at `u` in (0, 1), increasing in `u`, in a run whose own seed is `seed`.
     pub fn value(&self, u: f64, seed: u64) -> f64 {
         match self {
             Self::Uniform { min, max } => (min + u * (max - min)).clamp(*min, *max),
@@ -240,7 +240,8 @@ impl Distribution {
             }
             Self::Normal { mean, deviation, min, max } => {
                 let [low, high] = [min, max].map(|end| (end - mean) / deviation);
-                // Far above the mean the parts below are too near 1 to be told apart, those above are not.
+                // Far above the mean, probabilities below a point are too close to 1 to distinguish; those
+                // above it are not.
                 let z = match low > 1.0 {
                     true => -quantile(below(-low) + u * (below(-high) - below(-low))),
                     false => quantile(below(low) + u * (below(high) - below(low))),
@@ -254,12 +255,12 @@ impl Distribution {
     }
 }
 
-/// The part of the standard normal distribution below `z`.
+/// The standard normal distribution function at `z`.
 pub(super) fn below(z: f64) -> f64 {
     elementary::erfc(-z * FRAC_1_SQRT_2) / 2.0
 }
 
-/// The number below which there is the part `p` of the standard normal distribution.
+/// The quantile of the standard normal distribution at `p`.
 fn quantile(p: f64) -> f64 {
     if p > 0.5 {
         return -quantile(1.0 - p);
@@ -267,8 +268,8 @@ fn quantile(p: f64) -> f64 {
     if p <= 0.0 {
         return f64::NEG_INFINITY;
     }
-    // The part below −z is at most exp(−z²/2)/2, and its logarithm is concave: Newton's method falls from there to the
-    // solution, until round-off.
+    // The probability below −z is at most exp(−z²/2)/2, and its logarithm is concave. So Newton's method
+    // decreases from this start to the solution, until round-off.
     let mut z = (-2.0 * elementary::ln(2.0 * p)).sqrt();
     loop {
         let part = below(-z);
@@ -281,8 +282,8 @@ fn quantile(p: f64) -> f64 {
     }
 }
 
-/// The 0.975 quantile of Student's distribution with `freedom` > 0 degrees of freedom, to nine decimals: beyond them the
-/// platform's functions differ.
+/// The 0.975 quantile of Student's distribution with `freedom` > 0 degrees of freedom, to nine decimals.
+/// Beyond these the platforms' functions differ.
 pub(super) fn student(freedom: f64) -> f64 {
     let quantile =
         StudentsT::new(0.0, 1.0, freedom).map_or(f64::INFINITY, |student| student.inverse_cdf(0.975));

@@ -1,4 +1,4 @@
-//! The campaign file: TOML text to a checked [`Campaign`], which needs no other file.
+//! The campaign file: parses TOML text into a checked [`Campaign`], which needs no other file.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -21,7 +21,7 @@ use crate::host::{Causality, DataType, Variability};
 use crate::package;
 use crate::text;
 
-/// A campaign file as it is written.
+/// The content of a campaign file.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
@@ -32,8 +32,8 @@ struct File {
     vary: BTreeMap<String, VarySection>,
 }
 
-/// `system`: the name of a system file, relative to the folder of the campaign file, or the system itself as a
-/// table.
+/// `system`: the name of a system file, relative to the folder of the campaign file, or the system itself as
+/// a table.
 #[derive(Clone, Debug)]
 enum SystemSource {
     File(PathBuf),
@@ -66,13 +66,13 @@ impl<'de> Deserialize<'de> for SystemSource {
 struct CampaignSection {
     /// The number of runs, 1 to 2⁵³.
     runs: u64,
-    /// Seed of the campaign: another number, another campaign; default 0.
+    /// Seed of the campaign; another seed makes another campaign. Default 0.
     #[serde(default)]
     seed: u64,
-    /// Spread of the variables over their distributions; default random.
+    /// How the drawn values are spread over their distributions; default random.
     #[serde(default)]
     sampling: Sampling,
-    /// Condition on a successful run; default kept.
+    /// Condition for a successful run; default kept.
     #[serde(default)]
     success: Success,
     /// Stop time in s, in place of the system's.
@@ -81,32 +81,33 @@ struct CampaignSection {
     step: Option<f64>,
 }
 
-/// Conditions on a successful run.
+/// Conditions for a successful run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Success {
     /// Every promise is kept, as for `punctual run --require kept`.
     #[default]
     Kept,
-    /// Every barrier has arrived by its deadline and is not left from then on, whether or not its samples met the
+    /// Every barrier is reached by its deadline and not left afterwards, whether or not its samples met the
     /// constraint.
     OnTimeAndInside,
 }
 
-/// The texts that a campaign is made of. Its rows depend on them and this program alone.
+/// The texts that define a campaign. Its rows depend only on them and on this program.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Source {
     /// The campaign file.
     pub file: String,
-    /// The system file, where the campaign file names one.
+    /// The system file, if the campaign file names one.
     pub system: Option<String>,
-    /// The configuration of each component in turn, with every value stated; or what tells an FMU of another program.
+    /// The configuration of each component in order, with every value stated. For an FMU of another program,
+    /// the text that identifies its file.
     pub configurations: Vec<String>,
 }
 
 impl Source {
-    /// A name-based UUID of all texts and the version of this program: campaigns with the same UUID have the same
-    /// rows.
+    /// A name-based UUID of all texts and the version of this program. Campaigns with the same UUID have the
+    /// same rows.
     pub fn fingerprint(&self) -> String {
         let parts = [Some(&self.file), self.system.as_ref()];
         let parts = parts.into_iter().flatten().chain(&self.configurations);
@@ -116,11 +117,11 @@ impl Source {
     }
 }
 
-/// A campaign in one file, with all that other machines need to run it; as JSON.
+/// A campaign in one JSON file, with everything that another machine needs to run it.
 #[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct Packed {
-    /// The version that packed it.
+    /// The version of the program that packed it.
     version: String,
     /// [`Source::fingerprint`].
     fingerprint: String,
@@ -154,8 +155,8 @@ pub struct Choice {
     pub seed: u64,
     /// The values of the varied variables, in order.
     pub values: Vec<f64>,
-    /// Where not empty, the seeds of the pieces of the run, in place of `seed`: pieces of equal numbers of steps, in
-    /// which noise has whole periods.
+    /// If not empty, the seeds of the pieces of the run, in place of `seed`. Pieces have equal numbers of
+    /// steps and contain whole periods of the noise.
     pub pieces: Vec<u64>,
 }
 
@@ -174,16 +175,16 @@ pub struct Campaign {
 }
 
 impl Campaign {
-    /// Reads and checks the campaign file at `path` with the files that it names: its system file and the
-    /// components' FMUs (or configurations that these are built from, `.toml`). What [`Campaign::packed`] gave replaces
-    /// all of them.
+    /// Reads and checks the campaign file at `path` and the files that it names: its system file and the
+    /// components' FMUs, or the configurations (`.toml`) to build them from. A file from [`Campaign::packed`]
+    /// replaces all of them.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read; a key or value that cannot be used.
+    /// A file that cannot be read, or a key or value that cannot be used.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let source_text = text::read(path)?;
-        // No text of TOML begins so.
+        // TOML text never begins with a brace.
         if source_text.starts_with('{') {
             return Self::unpacked(&source_text, path);
         }
@@ -248,11 +249,11 @@ impl Campaign {
         if campaign.runs == runs { Ok(campaign) } else { Err(changed()) }
     }
 
-    /// The campaign with all that it needs, as one text.
+    /// The campaign as one text, with everything that it needs.
     ///
     /// # Errors
     ///
-    /// A component that is no text: an FMU of another program.
+    /// A component without a text form: an FMU of another program.
     pub fn packed(&self) -> Result<String, Error> {
         let mut parts = self.models.iter().zip(self.system.components());
         if let Some((_, component)) = parts.find(|(part, _)| part.configuration().is_none()) {
@@ -268,11 +269,11 @@ impl Campaign {
             runs: self.runs,
             source: self.source.clone(),
         };
-        // Texts and numbers alone are always written.
+        // Serialising only texts and numbers cannot fail.
         Ok(serde_json::to_string_pretty(&packed).unwrap_or_default() + "\n")
     }
 
-    /// Checks a campaign whose texts are given; errors name `path` or `system_path`.
+    /// Checks a campaign given as texts; errors name `path` or `system_path`.
     ///
     /// # Errors
     ///
@@ -369,7 +370,7 @@ impl Campaign {
         &self.source
     }
 
-    /// The coupled system, with the times of the campaign.
+    /// The coupled system, with the times that the campaign sets.
     pub fn system(&self) -> &System {
         &self.system
     }
@@ -384,7 +385,7 @@ impl Campaign {
         &self.varied
     }
 
-    /// How the runs are spread over what is varied.
+    /// How the runs are spread over the varied values.
     pub fn sampling(&self) -> Sampling {
         self.sampling
     }
@@ -399,23 +400,23 @@ impl Campaign {
         self.runs
     }
 
-    /// What holds for every run and the user should know.
+    /// Notes for the user that hold for every run.
     pub fn notes(&self) -> &[String] {
         &self.notes
     }
 
-    /// The condition on a successful run.
+    /// The condition for a successful run.
     pub fn success(&self) -> Success {
         self.success
     }
 
-    /// The least number of steps in which the noise of every plant whose seed is varied has whole periods, so that a
-    /// change of the seed after them begins with a period. `None` where no seed is varied.
+    /// The least number of steps that holds whole noise periods of every plant whose seed is varied. A new
+    /// seed after that many steps starts with a new period. `None` if no seed is varied.
     ///
     /// # Errors
     ///
-    /// A variable that takes the seed and is not that of a plant's `[disturbance]`; a period that is varied; a start time or
-    /// steps that its periods do not fit.
+    /// A seed that is varied but is not that of a plant's `[disturbance]`; a period that is varied; a start
+    /// time or step that does not fit the periods.
     pub(super) fn piece(&self) -> Result<Option<u64>, Error> {
         let experiment = self.system.experiment();
         let mut periods = Vec::new();
@@ -465,7 +466,7 @@ impl Campaign {
             );
             Error::configuration(format!("vary.{:?}.distribution", varied.name), message)
         })?;
-        // More pieces would only take memory.
+        // More pieces would only cost memory.
         Ok(Some(steps * self.grid().steps().div_ceil(steps * MOST_PIECES)))
     }
 
@@ -475,11 +476,11 @@ impl Campaign {
         Grid::new(experiment.start_time, experiment.stop_time, experiment.step)
     }
 
-    /// The campaign of one run, that from `choice`.
+    /// The campaign that consists of one run, drawn as `choice`.
     ///
     /// # Errors
     ///
-    /// None that this campaign allows.
+    /// None if the choice is one of this campaign.
     pub(super) fn alone(&self, choice: &Choice) -> Result<Self, Error> {
         let mut file: serde_json::Value = read_toml(&self.source.file)?;
         file["campaign"]["runs"] = 1.into();
@@ -499,7 +500,7 @@ impl Campaign {
         Self::of(source, Path::new("the worst run"), Path::new("the worst run"))
     }
 
-    /// Draws the numbers of run `number`: a function of the campaign's texts and the number alone.
+    /// Draws the numbers of run `number`. They depend only on the campaign's texts and on the number.
     pub fn choice(&self, number: u64) -> Choice {
         let mut values = Vec::new();
         let seed = self.sampler.draw(number, &mut values);
@@ -509,19 +510,19 @@ impl Campaign {
         Choice { seed, values, pieces: Vec::new() }
     }
 
-    /// Couples the components as `system` says, which is the campaign's but for the signals that it records. FMUs of
-    /// others are loaded for it alone.
+    /// Couples the components as `system` says, which differs from the campaign's only in the signals that it
+    /// records. FMUs of other programs are loaded for this simulation alone.
     ///
     /// # Errors
     ///
-    /// A signal to record or draw that does not exist; an FMU that is another one by now, or cannot be loaded.
+    /// A signal to record or draw that does not exist; an FMU that has changed since, or cannot be loaded.
     pub fn simulation(&self, system: &System) -> Result<Simulation, Error> {
         let descriptions: Vec<_> = self.models.iter().map(Part::description).collect();
         let instance = |c: usize| self.models[c].instance(&system.components()[c].name);
         Simulation::assembled(system, &descriptions, instance)
     }
 
-    /// Gives `simulation` the start values of a run, and what changes in it.
+    /// Gives `simulation` the start values of a run, and the values that change during it.
     pub fn start(&self, simulation: &mut Simulation, choice: &Choice) {
         for (varied, value) in self.varied.iter().zip(&choice.values) {
             simulation.set_start(varied.component, varied.reference, *value);
@@ -542,7 +543,7 @@ impl Campaign {
     }
 }
 
-/// The refusal of a name under `vary` that has dots and no quotes, so that TOML takes it for tables in one another.
+/// The error for a name under `vary` that has dots but no quotes, which TOML reads as nested tables.
 fn unquoted(text: &str) -> Option<ConfigurationError> {
     let file: serde_json::Value = read_toml(text).ok()?;
     for (first, mut found) in file.get("vary")?.as_object()? {
@@ -560,13 +561,13 @@ fn unquoted(text: &str) -> Option<ConfigurationError> {
     None
 }
 
-/// The whole number that `ratio` is but for round-off.
+/// The whole number that equals `ratio` up to round-off, if there is one.
 fn whole(ratio: f64) -> Option<f64> {
     let whole = ratio.round();
     ((ratio - whole).abs() <= 1e-6).then_some(whole)
 }
 
-/// The most pieces of a run with seeds of their own.
+/// The most pieces of a run that have seeds of their own.
 const MOST_PIECES: u64 = 1000;
 
 // Counts travel as 64-bit integers, seeds as doubles.

@@ -1,4 +1,4 @@
-//! The parts of a campaign that several machines made, joined to the file of one that made them all.
+//! Joins the parts of a campaign that several machines made into the file that one machine would have made.
 
 use std::fs;
 use std::ops::Range;
@@ -16,12 +16,14 @@ struct Part {
     path: PathBuf,
 }
 
-/// Joins the parts in `files` to `output`, byte for byte what one machine would have written there. A folder stands
-/// for all files in it that end in `.parquet`, but for whole results of this campaign. An `output` that is complete stays.
+/// Joins the parts in `files` into `output`, byte for byte what one machine would have written. A folder
+/// stands for all `.parquet` files in it, except complete results of this campaign. An `output` that is
+/// already complete is kept.
 ///
 /// # Errors
 ///
-/// A part that is missing, there twice, not whole, or of another campaign; a file that cannot be read or written.
+/// A part that is missing, duplicated, incomplete, or of another campaign; a file that cannot be read or
+/// written.
 pub fn join(campaign: &Campaign, files: &[PathBuf], output: &Path) -> Result<(), Error> {
     let measures = Measures::new(campaign)?;
     let mut parts = Vec::new();
@@ -80,9 +82,9 @@ pub fn join(campaign: &Campaign, files: &[PathBuf], output: &Path) -> Result<(),
     folder.remove()
 }
 
-/// The files that are meant by `files`.
+/// The files that `files` stand for.
 fn listed(campaign: &Campaign, files: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
-    // What cannot be read is reported as a part.
+    // A file that cannot be read counts as a part, and is reported as one.
     let is_result = |file: &Path| {
         runner::recorded(file).is_ok_and(|(reader, source)| {
             source == *campaign.source()
@@ -107,7 +109,7 @@ fn listed(campaign: &Campaign, files: &[PathBuf]) -> Result<Vec<PathBuf>, Error>
     Ok(all)
 }
 
-/// The part in the file at `path`, if it is one of `campaign`.
+/// The part in the file at `path`, if it belongs to `campaign`.
 fn checked(campaign: &Campaign, path: PathBuf) -> Result<Part, Error> {
     let refused = |message: String| Error::configuration("--join", format!("{} {message}", path.display()));
     let unfinished = runner::parts_folder(&path);
@@ -143,7 +145,7 @@ fn checked(campaign: &Campaign, path: PathBuf) -> Result<Part, Error> {
     Ok(Part { runs, path })
 }
 
-/// Where the campaign of a part is another one.
+/// What distinguishes the campaign of a part from this one.
 fn difference(campaign: &Campaign, theirs: &Source, path: &Path) -> String {
     let ours = campaign.source();
     if theirs.file != ours.file {

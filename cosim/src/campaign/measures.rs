@@ -1,4 +1,4 @@
-//! The row of a run, from the values at the communication points and from its promises.
+//! Computes the row of a run from the values at the communication points and from its promises.
 
 use std::collections::HashSet;
 
@@ -15,7 +15,7 @@ struct FilterPlan {
     component: String,
     /// Names and units of its inputs to the plant.
     inputs: Vec<(String, String)>,
-    /// Whether it follows plans.
+    /// Whether it follows backup plans.
     assured: bool,
     barriers: Vec<BarrierPlan>,
 }
@@ -27,20 +27,20 @@ struct BarrierPlan {
     unit: String,
 }
 
-/// The plan by which a campaign measures its runs.
+/// What a campaign measures in each run.
 pub struct Measures {
     filters: Vec<FilterPlan>,
     success: Success,
     columns: Vec<Column>,
 }
 
-/// Findings on a filter in one run.
+/// What was observed of a filter in one run.
 struct Seen {
     /// Number of steps by status.
     counts: [u64; Status::ALL.len()],
     /// Number of steps by status of its guarantee.
     assurance_statuses: [u64; AssuranceStatus::ALL.len()],
-    /// Largest size by input.
+    /// Largest magnitude of each input.
     peaks: Vec<f64>,
 }
 
@@ -49,7 +49,7 @@ impl Measures {
     ///
     /// # Errors
     ///
-    /// Names of a filter that make two columns of one name.
+    /// Names in a filter that would make two columns of the same name.
     pub fn new(campaign: &Campaign) -> Result<Self, Error> {
         let mut filters = Vec::new();
         for (c, part) in campaign.models().iter().enumerate() {
@@ -99,7 +99,7 @@ impl Measures {
         self.filters.iter().flat_map(|filter| &filter.barriers).map(|barrier| barrier.name.as_str())
     }
 
-    /// The signals that are measured, in the order of `Measures::see`.
+    /// The measured signals, in the order that `Measures::see` expects.
     pub fn signals(&self) -> Vec<String> {
         let mut signals = Vec::new();
         for filter in &self.filters {
@@ -115,7 +115,7 @@ impl Measures {
         self.run_from(campaign, simulation, number, &campaign.choice(number))
     }
 
-    /// As [`Measures::run`], from what else than its number draws.
+    /// Like [`Measures::run`], but starts from `choice` instead of the run's own draw.
     pub(super) fn run_from(
         &self,
         campaign: &Campaign,
@@ -205,7 +205,7 @@ impl Measures {
     }
 }
 
-/// Counts a step under the first of `values`, which is taken away.
+/// Counts a step under the first of `values`, and removes that value.
 fn count(counts: &mut [u64], values: &mut &[f64]) {
     if let Some(number) = values.split_off_first()
         && let Some(count) = counts.get_mut(*number as usize)

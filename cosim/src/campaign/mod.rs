@@ -1,9 +1,10 @@
 //! Many runs of one system from drawn starts, parameters and disturbances, on all cores.
 //!
-//! A run is a function of the campaign's texts and its number. Its row does not show which run follows which, on
-//! which thread, or where a campaign was interrupted. The blocks are those of the FMUs, in process and coupled by the same
-//! master. So a row is what `punctual run` would find, bit for bit. An FMU of another program is loaded for each thread and
-//! instantiated for each run; the same is true of it as far as its steps depend on nothing else.
+//! A run depends only on the campaign's texts and its number. Its row does not depend on which run came
+//! before it, on the thread, or on where a campaign was interrupted. The blocks are those of the FMUs, run in
+//! process and coupled by the same master, so a row is bit for bit what `punctual run` would find. An FMU of
+//! another program is loaded for each thread and instantiated for each run; the same holds for it if its
+//! steps depend on nothing else.
 
 mod arrow;
 mod distribution;

@@ -1,7 +1,7 @@
 //! The components of a campaign: configurations, which run in process, and FMUs of other programs.
 //!
-//! A campaign knows each by a text. That of a configuration is the configuration with every value stated. That of an FMU of
-//! others tells its file by its content, which lies where the system says.
+//! A campaign identifies each by a text. For a configuration, this is the configuration with every value
+//! stated. For an FMU of another program, it is a digest of the file, which stays where the system file says.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ use crate::host::{Description, Fmu, Fresh, Participant};
 use crate::package;
 use crate::text;
 
-/// The text of an FMU of others.
+/// The text that stands for an FMU of another program.
 #[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct Foreign {
@@ -49,12 +49,12 @@ pub enum Part {
 }
 
 impl Part {
-    /// The text of the component in the file at `path`, which `field` names. An FMU of this program carries its
-    /// configuration.
+    /// The text of the component in the file at `path`, which `field` names. An FMU of this program contains
+    /// its configuration.
     ///
     /// # Errors
     ///
-    /// A file that is missing or cannot be used; an FMU by another version of this program.
+    /// A file that is missing or cannot be used; an FMU built by another version of this program.
     pub(super) fn text(path: &Path, field: &str) -> Result<String, Error> {
         if text::is_toml(path) {
             return Ok(package::read_configuration(path)?.canonical()?);
@@ -83,11 +83,11 @@ impl Part {
         Ok(product.configuration.canonical()?)
     }
 
-    /// The `component` of this text, of the system in the file at `system`.
+    /// Reads `component` from its text. `system` is the path of the system file.
     ///
     /// # Errors
     ///
-    /// A text that is none; an FMU that is not there, or is another one.
+    /// A text that describes no component; an FMU that is missing or has changed.
     pub(super) fn of(text: &str, component: &Component, system: &Path) -> Result<Self, Error> {
         let Ok(Foreign { digest, .. }) = read_toml(text) else {
             return Ok(Self::Own(Box::new(Own::new(parsed(text)?)?)));
@@ -115,11 +115,12 @@ impl Part {
         }
     }
 
-    /// An instance called `name`, which a thread of its own may use. An FMU of others is unpacked and loaded for each.
+    /// An instance called `name` for the calling thread. An FMU of another program is unpacked and loaded for
+    /// each instance.
     ///
     /// # Errors
     ///
-    /// An FMU that is another one by now, or cannot be loaded or instantiated.
+    /// An FMU that has changed since, or cannot be loaded or instantiated.
     pub(super) fn instance(&self, name: &str) -> Result<Box<dyn Participant>, Error> {
         Ok(match self {
             Self::Own(own) => Box::new(own.instance(name)?),
@@ -132,7 +133,7 @@ impl Part {
     }
 }
 
-/// Opens the FMU of the component called `name`, if it is that of the `digest`.
+/// Opens the FMU of the component called `name` if its digest is the one `wanted`.
 fn open(path: &Path, wanted: &str, name: &str) -> Result<Fmu, Error> {
     let wrong = |message: String| Err(Error::configuration(format!("component {name:?}"), message));
     if !path.exists() {
@@ -152,7 +153,7 @@ fn digest(path: &Path) -> Result<String, Error> {
     Ok(Uuid::new_v5(&Uuid::NAMESPACE_OID, &bytes).to_string())
 }
 
-/// Parses a configuration, if it needs no library.
+/// Parses a configuration that needs no plug-in.
 fn parsed(text: &str) -> Result<Configuration, ConfigurationError> {
     Configuration::parse(text).map_err(|e| match e.field() {
         "plant.plugin" => ConfigurationError::new(

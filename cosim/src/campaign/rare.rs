@@ -1,12 +1,12 @@
-//! The probability that a run of a campaign fails, however rare that is, with the worst run found.
+//! Estimates the probability that a run of a campaign fails, however rare that is, and finds the worst run.
 //!
-//! What is estimated: the probability that what `[vary]` draws leads to a run that fails. A run is a function of the numbers
-//! drawn at its start and of the noise in it. The noise comes in pieces with a seed each, independent of each other. So
-//! subset simulation over numbers and seeds is what splitting is elsewhere ([`super::splitting`]). Its margin is the least
-//! h of all barriers from their deadlines on.
+//! A run is a function of the numbers drawn at its start and of the noise in it. The estimate is the
+//! probability that the distributions of `[vary]` lead to a run that fails. The noise comes in independent
+//! pieces, each with its own seed. So subset simulation works on the drawn numbers and the seeds
+//! ([`super::splitting`]). The margin of a run is the least h of all barriers from their deadlines on.
 //!
-//! The pilot's plan and each repeat are kept beside the output, in the folder `<output>.rare.parts`, until the estimate is
-//! made. So an interrupted one goes on from there, with the same numbers.
+//! The pilot's plan and the repeats are kept beside the output, in the folder `<output>.rare.parts`, until
+//! the estimate is complete. So an interrupted estimate resumes there and gives the same numbers.
 
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -30,15 +30,15 @@ use crate::whole;
 pub struct Rare {
     /// The probability that a run fails.
     pub probability: f64,
-    /// Interval for it, with a confidence of 95 %.
+    /// Its confidence interval, at a confidence of 95 %.
     pub interval: [f64; 2],
-    /// Independent repeats that it is the mean of.
+    /// Number of independent repeats that `probability` averages.
     pub repeats: usize,
-    /// The levels of h on the way.
+    /// The intermediate levels of h.
     pub levels: Vec<f64>,
     /// Runs made.
     pub runs: u64,
-    /// Runs that plain sampling takes for the same standard deviation.
+    /// Number of runs that plain sampling would need for the same standard deviation.
     pub plain_runs: f64,
     /// The worst failure found.
     pub worst: Failing,
@@ -47,7 +47,7 @@ pub struct Rare {
 /// A failing run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Failing {
-    /// Least h of all barriers from their deadlines on; `None` where the run ended before.
+    /// Least h of all barriers from their deadlines on; `None` if the run ended before.
     pub least_h: Option<f64>,
     /// The value of each varied variable.
     pub values: Vec<Value>,
@@ -58,11 +58,12 @@ pub struct Failing {
 pub struct Value {
     /// `component.variable`.
     pub name: String,
-    /// Its unit; empty where it has none.
+    /// Its unit; empty if it has none.
     pub unit: String,
     /// Its value.
     pub value: f64,
-    /// Of a seed, the number of values that it takes one after the other, of which this is the first.
+    /// If the variable is a seed: the number of values that it takes one after the other, of which this is
+    /// the first.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub changes: Option<usize>,
 }
@@ -70,20 +71,20 @@ pub struct Value {
 /// How an estimate ended.
 #[derive(Clone, Debug)]
 pub enum Ended {
-    /// It is there.
+    /// The estimate is complete.
     Done(Box<Rare>),
-    /// It was stopped, with so many repeats kept for the next time.
+    /// It was stopped, and this many repeats are kept to resume from.
     Stopped(usize),
 }
 
-/// Estimates the probability that a run of `campaign` fails, and writes the worst one found to `output`, as a campaign of
-/// that run alone. Ends early once `stop` is set; what was made until then is kept beside `output`. `tell` gets the number
-/// of repeats there are, 0 after the pilot.
+/// Estimates the probability that a run of `campaign` fails, and writes the worst run found to `output`, as a
+/// campaign of that run alone. Ends early once `stop` is set; the results so far are kept beside `output`.
+/// `tell` gets the number of repeats completed, 0 after the pilot.
 ///
 /// # Errors
 ///
-/// A campaign that this does not fit; no way to failure; a file that is in the way, is another campaign's, or cannot be
-/// written.
+/// A campaign that the method does not fit; a pilot that finds no way to failure; a file that is in the way,
+/// belongs to another campaign, or cannot be written.
 pub fn rare(
     campaign: &Campaign,
     output: &Path,
@@ -96,16 +97,16 @@ pub fn rare(
     let measures = Measures::new(campaign)?;
     let margins = Margins::new(&measures)?;
     let crew = Crew::new(campaign, &measures, threads)?;
-    // After a stop all are alike, which ends the pilot and costs a repeat nothing.
+    // After a stop all margins are equal, which ends the pilot. The repeat under way is discarded.
     let margin = |z: &[f64], pieces: &[u64]| match stop.load(Ordering::Relaxed) {
         true => f64::INFINITY,
         false => margins.of(&crew.make(0, &choice(campaign, z, pieces))),
     };
-    // The sample at the stop time is one more.
+    // The sample at the stop time needs one more.
     let seeds = campaign.piece()?.map_or(0, |steps| campaign.grid().steps() / steps + 1) as usize;
     let problem =
         Problem { dimensions: campaign.varied().len(), seeds, seed: campaign.seed(), margin: &margin };
-    // The plan and the repeats, those of an earlier time first.
+    // The plan and the repeats, beginning with those of an earlier call.
     let store = Store::open(campaign, output)?;
     let mut made = match store.read()? {
         Some(made) => made,
@@ -115,7 +116,7 @@ pub fn rare(
             match plan {
                 Ok(plan) if !stopped => Made { plan, repeats: Vec::new() },
                 plan => {
-                    // Of a pilot nothing is kept.
+                    // An interrupted pilot keeps nothing.
                     store.remove()?;
                     let failure = plan.err().filter(|_| !stopped);
                     return failure.map_or(Ok(Ended::Stopped(0)), |failure| Err(stalled(failure)));
@@ -146,7 +147,7 @@ pub fn rare(
     };
     let worst = write(campaign, output, &worst)?;
     let runs = plan.made + made;
-    // Where every run failed there is no spread to go by: it is plain sampling.
+    // If every run failed, the repeats have no spread. The estimate is then that of plain sampling.
     let (interval, plain_runs) = match probability < 1.0 {
         true => (interval, (1.0 - probability) / (probability * deviation * deviation)),
         false => (Rate::of(made, made).interval, made as f64),
@@ -163,14 +164,14 @@ pub fn rare(
     })))
 }
 
-/// What an estimate is made of: the plan of its pilot, and its repeats from the first on.
+/// The state of an estimate: the pilot's plan and the repeats so far, from the first on.
 #[derive(Debug, Deserialize, Serialize)]
 struct Made {
     plan: Plan,
     repeats: Vec<Repeat>,
 }
 
-/// Where that is kept until the estimate is there.
+/// Keeps that state on the disk until the estimate is complete.
 struct Store {
     parts: Parts,
     file: PathBuf,
@@ -185,7 +186,8 @@ impl Store {
         Ok(Self { parts, file })
     }
 
-    /// What is there: a line with the fingerprint of the campaign and a checksum of the rest, then that.
+    /// Reads the state: one line with the fingerprint of the campaign and a checksum of the rest, then the
+    /// state itself.
     fn read(&self) -> Result<Option<Made>, Error> {
         let text = match fs::read_to_string(&self.file) {
             Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -206,9 +208,9 @@ impl Store {
         serde_json::from_str(made).map(Some).map_err(|_| damaged())
     }
 
-    /// Writes all or nothing.
+    /// Writes everything or nothing.
     fn write(&self, made: &Made) -> Result<(), Error> {
-        // Numbers alone are always written.
+        // Serialising only numbers cannot fail.
         let (identity, made) = (self.parts.identity(), serde_json::to_string(made).unwrap_or_default());
         whole::write(&self.file, format!("{identity} {}\n{made}", checksum(identity, &made)))
     }
@@ -225,7 +227,7 @@ fn checksum(identity: &str, made: &str) -> String {
     format!("{:08x}", crc32fast::hash(format!("{identity}\n{made}").as_bytes()))
 }
 
-/// Refuses what the method does not fit.
+/// Refuses a campaign that the method does not fit.
 fn check(campaign: &Campaign, output: &Path) -> Result<(), Error> {
     let wrong = |field: &str, message: &str| Err(Error::configuration(field, message));
     if campaign.success() != Success::OnTimeAndInside {
@@ -255,7 +257,7 @@ fn stalled(Stalled { margin, part, made }: Stalled) -> Error {
     Error::configuration("--rare", message)
 }
 
-/// What is drawn at a standard normal point, with the seeds of the pieces.
+/// The draw at a standard normal point, with the seeds of the pieces.
 fn choice(campaign: &Campaign, z: &[f64], pieces: &[u64]) -> Choice {
     let seed = pieces.first().copied().unwrap_or(0);
     let value = |(z, varied): (&f64, &super::file::Varied)| {
@@ -265,7 +267,7 @@ fn choice(campaign: &Campaign, z: &[f64], pieces: &[u64]) -> Choice {
     Choice { seed, values: z.iter().zip(campaign.varied()).map(value).collect(), pieces: pieces.to_vec() }
 }
 
-/// Places of the cells that tell the margin.
+/// The positions of the cells that give the margin.
 struct Margins {
     success: usize,
     least: Vec<usize>,
@@ -282,7 +284,7 @@ impl Margins {
         }
     }
 
-    /// Least h of the barriers, if all have one.
+    /// Least h of the barriers, if every barrier has one.
     fn least(&self, row: &Row) -> Option<f64> {
         let least = self.least.iter().map(|place| match &row[*place] {
             Cell::Number(number) => *number,
@@ -291,7 +293,7 @@ impl Margins {
         least.reduce(|a, b| Some(a?.min(b?))).flatten()
     }
 
-    /// Negative where the run fails, and nowhere else.
+    /// The margin: negative exactly if the run fails.
     fn of(&self, row: &Row) -> f64 {
         let least = self.least(row);
         match row[self.success] {
@@ -301,7 +303,7 @@ impl Margins {
     }
 }
 
-/// Makes the run at `worst` as a campaign of its own.
+/// Writes the run at `worst` as a campaign of its own.
 fn write(campaign: &Campaign, output: &Path, worst: &Point) -> Result<Failing, Error> {
     let drawn = choice(campaign, &worst.z, &worst.seeds);
     let alone = campaign.alone(&drawn)?;

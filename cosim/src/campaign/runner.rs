@@ -1,10 +1,10 @@
 //! Makes the runs of a campaign on all cores and keeps their rows, so that it can be interrupted at any point and
 //! resumed.
 //!
-//! Rows go to segments beside the output, in the folder `<output>.parts`. A segment holds the next runs in order.
-//! It is written under another name, synchronised and renamed, so that it is there as a whole or not at all. When
-//! all runs are there, the segments are joined. Their cuts do not show in the result. A part of the runs is made in
-//! the same way, and its file tells which they are.
+//! Rows go to segments beside the output, in the folder `<output>.parts`. Each segment holds consecutive
+//! runs. It is written under a temporary name, synchronised and renamed, so that it is there completely or
+//! not at all. When all runs are there, the segments are joined. The result does not depend on where they
+//! were cut. A part of the runs is made in the same way, and its file records which runs they are.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -26,12 +26,13 @@ use super::table::{Cell, Checksum, GROUP, Reader, Row, Writer};
 use crate::coupling::Simulation;
 use crate::error::Error;
 
-/// Time that the runs of a segment take together: the most that is lost when the process is killed.
+/// Time that the runs of one segment take together, and so the most work that is lost if the process is
+/// killed.
 const SEGMENT: Duration = Duration::from_secs(3);
-/// Largest growth of the number of runs from one segment to the next, as a factor.
+/// The largest factor by which the number of runs grows from one segment to the next.
 const GROWTH: usize = 4;
 
-/// Names of the texts in the metadata of a file.
+/// Keys of the texts in the metadata of a file.
 pub(super) mod key {
     /// [`super::Source::fingerprint`].
     pub(crate) const FINGERPRINT: &str = "punctual.fingerprint";
@@ -41,11 +42,11 @@ pub(super) mod key {
     pub(crate) const FILE: &str = "punctual.campaign";
     /// [`super::Source::system`].
     pub(crate) const SYSTEM: &str = "punctual.system";
-    /// [`super::Source::configurations`], each with its number after this.
+    /// [`super::Source::configurations`]; the number of each follows this prefix.
     pub(crate) const CONFIGURATION: &str = "punctual.configuration.";
     /// Units and meanings of the columns, as JSON.
     pub(crate) const COLUMNS: &str = "punctual.columns";
-    /// Of a part: the first of its runs and the next one after it, `FIRST..NEXT`.
+    /// In a part: its first run and the one after its last, `FIRST..NEXT`.
     pub(crate) const RUNS: &str = "punctual.runs";
 }
 
@@ -54,7 +55,7 @@ pub(super) mod key {
 pub struct Options {
     /// The Parquet file.
     pub output: PathBuf,
-    /// The runs to make, a part of the campaign; `None` for all.
+    /// The range of runs to make; `None` for all.
     pub runs: Option<Range<u64>>,
     /// Number of runs made at once; default one for each core.
     pub threads: Option<NonZeroUsize>,
@@ -65,15 +66,15 @@ pub struct Options {
 pub struct Progress {
     /// Runs whose rows are kept.
     pub done: u64,
-    /// Number of these runs that were there before.
+    /// Number of these that an earlier call had made.
     pub before: u64,
-    /// Number of runs that were made again, since the file of their rows was damaged.
+    /// Number of runs that were repeated because the file with their rows was damaged.
     pub again: u64,
-    /// Wall time of the others.
+    /// Wall time of the runs made in this call.
     pub wall_time: Duration,
 }
 
-/// The metadata of a campaign's files; `runs` of a part.
+/// The metadata of a campaign's files; `runs` is the range of a part.
 pub(super) fn metadata(
     source: &Source,
     measures: &Measures,
@@ -99,7 +100,7 @@ pub(super) fn metadata(
 ///
 /// # Errors
 ///
-/// A file that cannot be read or is no campaign's.
+/// A file that cannot be read or belongs to no campaign.
 pub fn recorded(path: &Path) -> Result<(Reader, Source), Error> {
     let reader = Reader::open(path)?;
     let Some(file) = reader.text(key::FILE) else {
@@ -126,21 +127,21 @@ pub(super) fn is_part(reader: &Reader) -> bool {
     reader.text(key::RUNS).is_some()
 }
 
-/// The numbers of the runs in a file: those of its part, or all from 0 on.
+/// The numbers of the runs in a file: the range of a part, or all from 0 on.
 pub fn runs(reader: &Reader) -> Range<u64> {
     let part = reader.text(key::RUNS).and_then(|text| text.split_once(".."));
     let first = part.and_then(|(first, _)| first.parse().ok()).unwrap_or(0);
     first..first.saturating_add(reader.rows())
 }
 
-/// The folder of segments, which no other process uses.
+/// The folder of segments, locked against other processes.
 pub(super) struct Parts {
     folder: PathBuf,
-    /// The fingerprint of the campaign, for a part with its runs.
+    /// The fingerprint of the campaign; for a part, with its range of runs.
     identity: String,
     /// The runs that belong here.
     runs: Range<u64>,
-    /// Held as long as this lives.
+    /// The lock, held as long as this value lives.
     lock: File,
 }
 
@@ -186,7 +187,7 @@ impl Parts {
         Ok(parts)
     }
 
-    /// The fingerprint of the campaign, for a part with its runs.
+    /// The fingerprint of the campaign; for a part, with its range of runs.
     pub(super) fn identity(&self) -> &str {
         &self.identity
     }
@@ -196,21 +197,21 @@ impl Parts {
         self.folder.join("unfinished")
     }
 
-    /// Path of a file of another name in the folder.
+    /// Path of another file in the folder.
     pub(super) fn file(&self, name: &str) -> PathBuf {
         self.folder.join(name)
     }
 
-    /// Renames a file that is complete on the disk.
+    /// Gives a file that is complete on the disk its final name.
     pub(super) fn settle(&self, from: &Path, to: &Path) -> Result<(), Error> {
         fs::rename(from, to).map_err(|e| Error::io("write", to, e))?;
         let folder = to.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        // Not every system can synchronise a folder; a segment that is lost is made again.
+        // Some systems cannot synchronise a folder. If a segment is lost, its runs are made again.
         let _ = File::open(folder).and_then(|folder| folder.sync_all());
         Ok(())
     }
 
-    /// The segments that are there. None of them has a run of another.
+    /// The segments in the folder, none of which overlap.
     fn segments(&self) -> Result<Segments, Error> {
         let problem = |e| Error::io("read", &self.folder, e);
         let mut found = Vec::new();
@@ -236,11 +237,11 @@ impl Parts {
         Ok(found.into_iter().map(|(first, next, path)| (first, (next - first, path))).collect())
     }
 
-    /// The segments that are whole, and the number of runs in the others, which are removed.
+    /// The complete segments, and the number of runs in the damaged ones, which are removed.
     fn whole_segments(&self, measures: &Measures) -> Result<(Segments, u64), Error> {
         let (mut whole, mut damaged) = (Segments::new(), 0);
         for (first, (count, path)) in self.segments()? {
-            // What cannot be opened may be whole.
+            // A segment that cannot be opened may still be complete, so it is not removed.
             File::open(&path).map_err(|e| Error::io("read", &path, e))?;
             let runs = first..first + count;
             let rows = Reader::open(&path).and_then(|r| each_row(&r, &path, &runs, measures, |_| Ok(())));
@@ -259,7 +260,7 @@ impl Parts {
         for (_, path) in self.segments()?.values() {
             fs::remove_file(path).map_err(|e| Error::io("remove", path, e))?;
         }
-        // On Windows an open file keeps its folder.
+        // On Windows, a folder with an open file cannot be removed.
         drop(self.lock);
         for name in ["unfinished", "fingerprint", "lock"] {
             let path = self.folder.join(name);
@@ -294,7 +295,7 @@ pub(super) fn other_campaign(path: &Path, found: &str, wanted: &str) -> Error {
 ///
 /// # Errors
 ///
-/// It is of another campaign, has other runs of it, or cannot be read.
+/// It belongs to another campaign, has other runs of it, or cannot be read.
 pub(super) fn complete(campaign: &Campaign, output: &Path, wanted_runs: &Range<u64>) -> Result<bool, Error> {
     if !output.exists() {
         return Ok(false);
@@ -322,13 +323,13 @@ pub(super) fn complete(campaign: &Campaign, output: &Path, wanted_runs: &Range<u
     Ok(true)
 }
 
-/// The fingerprint in a file.
+/// The fingerprint recorded in a file.
 pub(super) fn fingerprint(reader: &Reader) -> &str {
     reader.text(key::FINGERPRINT).unwrap_or("none")
 }
 
-/// Makes the runs that are not there yet. Ends early once `stop` is set; then it keeps what it has made in order.
-/// `tell` gets the number of runs made so far.
+/// Makes the runs that are missing. Ends early once `stop` is set, and then keeps the runs made so far up to
+/// the first gap. `tell` gets the number of runs made so far.
 ///
 /// # Errors
 ///
@@ -343,7 +344,7 @@ pub fn run(
     let all = runs.end - runs.start;
     if complete(campaign, &options.output, &runs)? {
         if parts_folder(&options.output).exists() {
-            // The last process was killed between its last two steps.
+            // The last process was killed after it wrote the result and before it removed the folder.
             Parts::open(&options.output, campaign, options.runs.as_ref())?.remove()?;
         }
         return Ok(Progress { done: all, before: all, again: 0, wall_time: Duration::ZERO });
@@ -381,7 +382,7 @@ pub fn run(
     Ok(Progress { done, before, again, wall_time })
 }
 
-/// The parts of `runs` that are in none of the segments.
+/// The ranges of `runs` that no segment covers.
 fn gaps(segments: &Segments, runs: &Range<u64>) -> Vec<Range<u64>> {
     let ends = segments.iter().map(|(first, (count, _))| (*first, first + count));
     let mut due = runs.start;
@@ -395,11 +396,11 @@ fn gaps(segments: &Segments, runs: &Range<u64>) -> Vec<Range<u64>> {
     gaps
 }
 
-/// The rows of an interrupted campaign that are kept beside `output`; `None` where there are none.
+/// The rows of an interrupted campaign that are kept beside `output`; `None` if there are none.
 ///
 /// # Errors
 ///
-/// Another process has gone on with it; a file that cannot be read or written.
+/// Another process has resumed it; a file that cannot be read or written.
 pub fn kept(campaign: &Campaign, output: &Path) -> Result<Option<Reader>, Error> {
     let parts = Parts::open(output, campaign, None)?;
     let segments = parts.segments()?;
@@ -426,7 +427,8 @@ fn gather(
     writer.finish()
 }
 
-/// Gives `take` the rows of the file at `path`, a group at a time. They must be those of `runs`, and as they were written.
+/// Passes the rows of the file at `path` to `take`, one group at a time. The rows must be those of `runs` and
+/// have the checksum they were written with.
 pub(super) fn each_row(
     reader: &Reader,
     path: &Path,
@@ -460,11 +462,12 @@ pub(super) fn each_row(
 }
 
 thread_local! {
-    /// The simulation of this thread of a crew's pool. One with FMUs of others never leaves the thread that loaded them.
+    /// The simulation of this thread of the pool. With FMUs of other programs, it never leaves the thread
+    /// that loaded them.
     static SIMULATION: RefCell<Option<Simulation>> = const { RefCell::new(None) };
 }
 
-/// The threads, each with a simulation of its own.
+/// The worker threads, each with a simulation of its own.
 pub(super) struct Crew<'a> {
     campaign: &'a Campaign,
     measures: &'a Measures,
@@ -473,7 +476,8 @@ pub(super) struct Crew<'a> {
 
 impl Drop for Crew<'_> {
     fn drop(&mut self) {
-        // The threads end some time after the pool. FMUs of others are unloaded, and their files removed, before.
+        // The threads end some time after the pool is dropped. FMUs of other programs are unloaded, and their
+        // files removed, before that.
         self.pool.broadcast(|_| drop(SIMULATION.take()));
     }
 }
@@ -503,8 +507,8 @@ impl<'a> Crew<'a> {
         Ok(crew)
     }
 
-    /// Makes `runs`, and gives their rows to `keep` in order, some at a time. `tell` gets the number of those made.
-    /// Returns the number of those kept.
+    /// Makes `runs`, and passes their rows to `keep` in order, in batches. `tell` gets the number of runs
+    /// made. Returns the number of rows kept.
     fn work(
         &self,
         runs: Range<u64>,
@@ -543,7 +547,7 @@ impl<'a> Crew<'a> {
 
     /// Makes run `number` from `choice`, on a thread of the pool.
     pub(super) fn make(&self, number: u64, choice: &Choice) -> Row {
-        // A run that panicked leaves nothing behind, since the next one begins with a reset.
+        // A run that panicked has no effect on the next one, which begins with a reset.
         SIMULATION.with_borrow_mut(|simulation| match simulation {
             Some(simulation) => self.measures.run_from(self.campaign, simulation, number, choice),
             None => {

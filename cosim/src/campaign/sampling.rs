@@ -1,8 +1,8 @@
-//! From the number of a run to its seed and its point of the unit cube: a function of (seed, runs, kind,
-//! dimensions, number) and of nothing else. So any run can be drawn without those before it.
+//! Maps the number of a run to its seed and its point in the unit cube. Both depend only on (seed, runs,
+//! kind, dimensions, number), so any run can be drawn without those before it.
 //!
-//! All random numbers are read from ChaCha8 under the campaign's seed. Stream k belongs to run k. The streams
-//! from [`SHARED`] on belong to all runs together.
+//! All random numbers come from ChaCha8 keyed by the campaign's seed. Stream k belongs to run k. The streams
+//! from [`SHARED`] on are shared by all runs.
 
 use punctual_fmu::configuration::ConfigurationError;
 use rand_chacha::ChaCha8Rng;
@@ -11,7 +11,7 @@ use serde::Deserialize;
 
 use super::sobol::{DIMENSIONS, Sobol};
 
-/// Ways to spread points over the cube.
+/// Ways to spread points over the unit cube.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Sampling {
@@ -19,22 +19,22 @@ pub enum Sampling {
     #[default]
     Random,
     /// With one point in each of `runs` equal slices of each variable, in an order of its own: M. D. McKay,
-    /// R. J. Beckman and W. J. Conover, Technometrics 21 (1979), doi 10.2307/1268522.
+    /// R. J. Beckman and W. J. Conover, Technometrics 21 (1979), doi 10.1307/1268522.
     LatinHypercube,
     /// The Sobol sequence with a random digital shift.
     Sobol,
 }
 
-/// The first stream of [`Sequence`]; those of the runs are below.
+/// The first stream of a [`Sequence`]; the streams of the runs are below it.
 const SEQUENCES: u64 = 1 << 62;
-/// The first stream that belongs to all runs.
+/// The first stream that all runs share.
 const SHARED: u64 = 1 << 63;
 /// Streams that one dimension may use.
 const PER_DIMENSION: u64 = 16;
 /// Rounds of the permutation: four make a Feistel network a pseudorandom permutation (M. Luby and C. Rackoff,
 /// SIAM J. Comput. 17, 1988).
 const ROUNDS: u64 = 4;
-/// The greatest number of runs: numbers of runs and seeds are exact as doubles.
+/// The greatest number of runs. Up to it, doubles hold run numbers and seeds exactly.
 pub(super) const MAX_RUNS: u64 = 1 << 53;
 /// The greatest number of runs of a Sobol sequence.
 const MAX_SOBOL_RUNS: u64 = 1 << 32;
@@ -47,7 +47,7 @@ pub struct Sampler {
     dimensions: Vec<Dimension>,
 }
 
-/// Ways to make one coordinate.
+/// Ways to compute one coordinate.
 #[derive(Clone, Debug)]
 enum Dimension {
     Random,
@@ -116,8 +116,8 @@ impl Sampler {
         seed
     }
 
-    /// The place of `number` in a random permutation of the runs: a Feistel network over the next even number
-    /// of bits, gone through again until the result is the number of a run.
+    /// The position of `number` in a random permutation of the runs. A Feistel network over the next even
+    /// number of bits is iterated until the result is the number of a run.
     fn permuted(&self, number: u64, first_stream: u64) -> u64 {
         let bits = u64::BITS - (self.runs - 1).leading_zeros();
         let half = bits.div_ceil(2).max(1);
@@ -139,7 +139,7 @@ impl Sampler {
     }
 }
 
-/// Random numbers that belong to no run.
+/// Random numbers that belong to no single run.
 pub(super) struct Sequence(ChaCha8Rng);
 
 impl Sequence {
@@ -161,17 +161,17 @@ impl Sequence {
     }
 }
 
-/// A seed from 53 bits: as many as a double has.
+/// A seed of 53 bits, as many as a double holds exactly.
 fn seed(bits: u64) -> u64 {
     bits >> 11
 }
 
-/// A number in (0, 1) from 52 bits: neither end is ever drawn.
+/// A number in (0, 1) from 52 bits; the ends are never drawn.
 fn unit(bits: u64) -> f64 {
     ((bits >> 12) as f64 + 0.5) / (1_u64 << 52) as f64
 }
 
-/// Guards against rounding up at the end of the last slice.
+/// Guards against rounding up to 1 at the end of the last slice.
 fn below_one(u: f64) -> f64 {
     u.min(1.0 - f64::EPSILON / 2.0)
 }
@@ -197,12 +197,14 @@ mod tests {
             assert_eq!(all, points(kind, 1, 1000, 3));
             assert_ne!(all, points(kind, 2, 1000, 3));
             for d in 0..3 {
-                // 1/√(12·1000) = 0.009 for independent points; five of these.
+                // The standard deviation is 1/√(12·1000) = 0.009 for independent points; the bound is five of
+                // these.
                 let mean = all.iter().map(|(_, p)| p[d]).sum::<f64>() / 1000.0;
                 assert!((mean - 0.5).abs() < 0.046, "{kind:?}, {d}: {mean}");
             }
             let product = all.iter().map(|(_, p)| (p[0] - 0.5) * (p[1] - 0.5)).sum::<f64>() / 1000.0;
-            // 1/(12·√1000) = 0.0026 for independent coordinates; five of these.
+            // The standard deviation is 1/(12·√1000) = 0.0026 for independent coordinates; the bound is five
+            // of these.
             assert!(product.abs() < 0.013, "{kind:?}: coordinates depend on each other, {product}");
         }
     }
@@ -227,7 +229,7 @@ mod tests {
         assert!(seen.iter().all(|s| *s));
     }
 
-    /// Recorded campaigns are replayed from these numbers, so a crate must not change them.
+    /// Recorded campaigns are replayed from these numbers, so an update of a crate must not change them.
     #[test]
     fn the_streams_stay_what_they_are() {
         let mut point = Vec::new();

@@ -1,17 +1,18 @@
 //! Points of the Sobol sequence, each computed from its number alone, for up to [`DIMENSIONS`] dimensions.
 //!
 //! I. M. Sobol, *On the distribution of points in a cube and the approximate evaluation of integrals*, USSR
-//! Comput. Math. Math. Phys. 7 (1967), with the direction numbers of S. Joe and F. Y. Kuo, *Constructing Sobol
-//! sequences with better two-dimensional projections*, SIAM J. Sci. Comput. 30 (2008), doi 10.1137/070709359
-//! (file new-joe-kuo-6.21201). Written here since the crates found end at 2¹⁶ points or give points in order only.
+//! Comput. Math. Math. Phys. 7 (1967), with the direction numbers of S. Joe and F. Y. Kuo, *Constructing
+//! Sobol sequences with better two-dimensional projections*, SIAM J. Sci. Comput. 30 (2008), doi
+//! 10.1137/070709359 (file new-joe-kuo-6.21201). It is implemented here because the crates found stop at 2¹⁶
+//! points or only give points in order.
 
 /// The greatest number of dimensions.
 pub(super) const DIMENSIONS: usize = PRIMITIVE.len() + 1;
 
-/// Bits of a coordinate: there are 2³² points.
+/// Bits of a coordinate. There are 2³² points.
 const BITS: usize = 32;
 
-/// The inner coefficients `a` of the primitive polynomial of each dimension but the first, as bits, and its
+/// For each dimension but the first: the inner coefficients `a` of the primitive polynomial, as bits, and the
 /// initial numbers `m`, as many as the degree.
 const PRIMITIVE: [(u32, &[u32]); 20] = [
     (0, &[1]),
@@ -36,12 +37,12 @@ const PRIMITIVE: [(u32, &[u32]); 20] = [
     (4, &[1, 3, 7, 13, 13, 15, 69]),
 ];
 
-/// The directions of one dimension.
+/// The direction numbers of one dimension.
 #[derive(Clone, Debug)]
 pub(super) struct Sobol([u32; BITS]);
 
 impl Sobol {
-    /// The directions of `dimension`, from 0; `None` where there are no numbers for it.
+    /// The direction numbers of `dimension`, counted from 0; `None` beyond the table.
     pub(super) fn new(dimension: usize) -> Option<Self> {
         let mut v = [0; BITS];
         let Some(row) = dimension.checked_sub(1) else {
@@ -65,8 +66,9 @@ impl Sobol {
         Some(Self(v))
     }
 
-    /// The coordinate of point `number` (the lower 32 bits count) in units of 2⁻³². The order is that of the
-    /// definition, not of the Gray code: each block of 2^m points from a multiple of 2^m on is the same set.
+    /// The coordinate of point `number` in units of 2⁻³²; only the lower 32 bits of the number count. The
+    /// order is that of the definition, not of the Gray code: each block of 2^m points that begins at a
+    /// multiple of 2^m is the same set.
     pub(super) fn coordinate(&self, number: u64) -> u32 {
         self.0.iter().enumerate().filter(|(i, _)| number >> i & 1 == 1).fold(0, |sum, (_, v)| sum ^ v)
     }
@@ -76,8 +78,9 @@ impl Sobol {
 mod tests {
     use super::*;
 
-    /// The first 2¹² points have one coordinate in each interval of 2⁻¹², in every dimension. The first two
-    /// dimensions have one point in each of the elementary boxes of that volume (a (0, 2)-sequence in base 2).
+    /// The first 2¹² points have one coordinate in each interval of length 2⁻¹², in every dimension. The
+    /// first two dimensions have one point in each elementary box of that volume (a (0, 2)-sequence in base
+    /// 2).
     #[test]
     fn points_are_stratified() {
         const M: usize = 12;
@@ -100,7 +103,8 @@ mod tests {
         assert!(Sobol::new(DIMENSIONS).is_none());
     }
 
-    /// Points 5 and 4095 in units of 2^-12, as SciPy 1.17 gives them (unscrambled, its Gray-code order undone).
+    /// Points 5 and 4095 in units of 2^-12, as SciPy 1.17 gives them (unscrambled, with its Gray-code order
+    /// undone).
     #[test]
     fn points_are_those_of_others() {
         let expected: [(u64, [u32; DIMENSIONS]); 2] = [

@@ -1,19 +1,22 @@
-//! The probability that a margin is negative at a point of standard normal numbers and of seeds, by subset simulation:
-//! S.-K. Au and J. L. Beck, Probab. Eng. Mech. 16 (2001), doi 10.1016/S0266-8920(01)00019-4.
+//! Estimates, by subset simulation, the probability that a margin is negative. The margin is a function of
+//! standard normal numbers and of seeds. S.-K. Au and J. L. Beck, Probab. Eng. Mech. 16 (2001), doi
+//! 10.1016/S0266-8920(01)00019-4.
 //!
 //! ```text
 //! P(g < 0) = P(g ≤ L₁) · P(g ≤ L₂ | g ≤ L₁) · … · P(g < 0 | g ≤ Lₖ),   L₁ > L₂ > … > Lₖ ≥ 0
 //! ```
 //!
-//! Each factor is about [`PART`] and so takes few points. A pilot finds the levels L and the width of the moves. Then
-//! independent repeats take them as they are. With fixed levels and fixed moves the product of the parts is an unbiased
-//! estimate, however badly the moves mix: F. Cérou, P. Del Moral, T. Furon and A. Guyader, Stat. Comput. 22 (2012),
-//! doi 10.1007/s11222-011-9231-6. So the mean of the repeats is one too, and their spread tells its error.
+//! Each factor is about [`PART`], so it takes few points to estimate. A pilot finds the levels L and the
+//! width of the moves. Then independent repeats use them unchanged. With fixed levels and fixed moves, the
+//! product of the fractions is an unbiased estimate, however badly the moves mix: F. Cérou, P. Del Moral, T.
+//! Furon and A. Guyader, Stat. Comput. 22 (2012), doi 10.1007/s11222-011-9231-6. So the mean of the repeats
+//! is unbiased too, and their spread gives its error.
 //!
-//! A move from z proposes √(1 − σ²) z + σ ξ with ξ standard normal, which leaves the standard normal distribution as it
-//! is, and is made where g ≤ L stays true: I. Papaioannou, W. Betz, K. Zwirglmaier and D. Straub, Probab. Eng. Mech. 41
-//! (2015), doi 10.1016/j.probengmech.2015.06.006. Each seed, of one piece of the noise of a run, is drawn again with the
-//! probability σ² and stays otherwise, which leaves independent seeds as they are too.
+//! A move from z proposes √(1 − σ²) z + σ ξ with ξ standard normal, which preserves the standard normal
+//! distribution. It is accepted if g ≤ L still holds: I. Papaioannou, W. Betz, K. Zwirglmaier and D. Straub,
+//! Probab. Eng. Mech. 41 (2015), doi 10.1016/j.probengmech.2015.06.006. Each seed belongs to one piece of the
+//! noise of a run. It is redrawn with probability σ² and kept otherwise, which preserves the distribution of
+//! independent seeds.
 
 use std::f64::consts::TAU;
 
@@ -28,17 +31,18 @@ use super::sampling::Sequence;
 
 /// Points of the pilot, and of each repeat, at every level.
 const POINTS: usize = 500;
-/// The part of the points that the pilot lets through a level.
+/// The fraction of the points that the pilot lets pass each level.
 const PART: f64 = 0.2;
-/// Moves of a point at every level.
+/// Moves of each point at every level.
 const MOVES: usize = 6;
-/// The part of moves that are made, as the pilot wants it, and how fast it steers there.
+/// The fraction of accepted moves that the pilot aims for, and how fast it adapts the width.
 const WANTED: f64 = 0.4;
 const STEERING: f64 = 1.5;
-/// The most levels: the part of the points beyond them would be below 1e-15, where doubles just below 1 end.
+/// The most levels. Beyond them the probability would be below 1e-15, where doubles cannot resolve
+/// probabilities near 1.
 const MOST_LEVELS: usize = 21;
 
-/// Draws one sequence for each key.
+/// Gives one random sequence for each key.
 fn generator(seed: u64, repeat: usize, level: usize, point: usize) -> Sequence {
     Sequence::new(seed, ((repeat as u64) << 32) + ((level as u64) << 16) + point as u64)
 }
@@ -55,7 +59,7 @@ fn normal(rng: &mut Sequence, z: &mut [f64]) {
     }
 }
 
-/// Numbers that may be infinite in JSON, which has none: their bits.
+/// Stores numbers as their bits, since JSON has no infinite numbers.
 mod exact {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -77,17 +81,17 @@ pub(super) struct Point {
     pub(super) z: Vec<f64>,
     /// Seeds below 2⁵³.
     pub(super) seeds: Vec<u64>,
-    /// Negative where it fails.
+    /// Negative if the point fails.
     #[serde(with = "exact")]
     pub(super) margin: f64,
 }
 
-/// What a pilot found for the repeats.
+/// What the pilot found for the repeats.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub(super) struct Plan {
-    /// The margins to reach, falling; below the last one comes failure.
+    /// The margins to reach, decreasing. Below the last one is failure.
     pub(super) levels: Vec<Level>,
-    /// Points whose margin was computed for it.
+    /// Number of points at which the pilot computed the margin.
     pub(super) made: u64,
 }
 
@@ -101,7 +105,7 @@ pub(super) struct Level {
     width: f64,
 }
 
-/// One repeat by a plan.
+/// One repeat that follows a plan.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub(super) struct Repeat {
     /// Its estimate.
@@ -110,33 +114,33 @@ pub(super) struct Repeat {
     worst: Option<Point>,
 }
 
-/// An estimate with its interval.
+/// An estimate with its confidence interval.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Estimate {
     pub(super) probability: f64,
-    /// With a confidence of 95 %.
+    /// At a confidence of 95 %.
     pub(super) interval: [f64; 2],
-    /// Standard deviation of the estimate, as a part of it.
+    /// Standard deviation of the estimate, relative to it.
     pub(super) deviation: f64,
-    /// The failing point with the least margin that was kept; the first of equal ones.
+    /// The failing point with the least margin over the repeats; the first of equal ones.
     pub(super) worst: Option<Point>,
-    /// Points whose margin was computed for it.
+    /// Number of points at which the repeats computed the margin.
     pub(super) made: u64,
 }
 
-/// Why there is no plan: the least margin at which the points stay.
+/// Why there is no plan: the least margin that the points reached.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Stalled {
     pub(super) margin: f64,
-    /// About the part of all points that come so far.
+    /// Roughly the fraction of all points that get this far.
     pub(super) part: f64,
     pub(super) made: u64,
 }
 
-/// The margin at numbers and seeds.
+/// The margin as a function of numbers and seeds.
 pub(super) type Margin<'a> = dyn Fn(&[f64], &[u64]) -> f64 + Sync + 'a;
 
-/// The problem: a margin of points with so many numbers and seeds, and the seed of all draws.
+/// The problem: a margin that depends on this many numbers and seeds, and the seed of all draws.
 pub(super) struct Problem<'a> {
     pub(super) dimensions: usize,
     pub(super) seeds: usize,
@@ -145,7 +149,7 @@ pub(super) struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// Independent points.
+    /// Draws independent points.
     fn first(&self, repeat: usize) -> Vec<Point> {
         let point = |i: usize| {
             let mut z = vec![0.0; self.dimensions];
@@ -157,8 +161,8 @@ impl Problem<'_> {
         (0..POINTS).into_par_iter().map(point).collect()
     }
 
-    /// Tries to move the point `moves` times by steps of width `width`, and stays at or below `level`. Returns how often
-    /// it moved.
+    /// Tries to move the point `moves` times by steps of width `width`, and stays at or below `level`.
+    /// Returns how often it moved.
     fn moved(&self, point: &mut Point, rng: &mut Sequence, level: f64, width: f64, moves: usize) -> usize {
         let (mut step, mut seeds) = (vec![0.0; self.dimensions], vec![0; self.seeds]);
         let (mut made, keep) = (0, (1.0 - width * width).sqrt());
@@ -199,7 +203,7 @@ impl Problem<'_> {
             let l = plan.levels.len() + 1;
             points = resampled(points, level, &mut generator(self.seed, 0, l, POINTS));
             let mut generators: Vec<_> = (0..POINTS).map(|i| generator(self.seed, 0, l, i)).collect();
-            // Twice as many as later, so that the width settles.
+            // Twice as many moves as in a repeat, so that the width settles.
             for _ in 0..2 * MOVES {
                 let moved: usize = points
                     .par_iter_mut()
@@ -214,7 +218,8 @@ impl Problem<'_> {
         }
     }
 
-    /// Repeat number `repeat`, from 1, by `plan`: a function of the problem, the plan and the number alone.
+    /// Repeat number `repeat`, counted from 1, with `plan`. It depends only on the problem, the plan and the
+    /// number.
     pub(super) fn repeat(&self, plan: &Plan, repeat: usize) -> Repeat {
         let mut points = self.first(repeat);
         let mut probability = 1.0;
@@ -236,15 +241,15 @@ impl Problem<'_> {
     }
 }
 
-/// The mean of two or more `repeats` by `plan`.
+/// The mean of two or more `repeats` with `plan`.
 pub(super) fn estimate(plan: &Plan, repeats: &[Repeat]) -> Estimate {
     let n = repeats.len() as f64;
     let probability = repeats.iter().map(|r| r.probability).sum::<f64>() / n;
     let variance =
         repeats.iter().map(|r| elementary::powi(r.probability - probability, 2)).sum::<f64>() / (n - 1.0);
-    // Where none arrives, nothing is known of it.
+    // If no repeat reaches failure, the deviation is unknown.
     let deviation = if probability > 0.0 { (variance / n).sqrt() / probability } else { f64::INFINITY };
-    // Of the logarithm, since estimates of rare events are skewed to the right.
+    // The interval is for the logarithm, since estimates of rare events are skewed to the right.
     let factor = elementary::exp(student(n - 1.0) * deviation);
     let made = (repeats.len() * POINTS * (1 + MOVES * plan.levels.len())) as u64;
     let high = if probability > 0.0 { (probability * factor).min(1.0) } else { 1.0 };
@@ -253,16 +258,16 @@ pub(super) fn estimate(plan: &Plan, repeats: &[Repeat]) -> Estimate {
     Estimate { probability, interval, deviation, worst, made }
 }
 
-/// The one with the lesser margin; the first of equal ones.
+/// The point with the lesser margin; the first of equal ones.
 fn worse(a: Point, b: Point) -> Point {
     if b.margin < a.margin { b } else { a }
 }
 
-/// As many points, drawn evenly from those at or below `level`: each as often as any other, but for a rest that is drawn
-/// without repetition.
+/// Resamples to the same number of points from those at or below `level`. Each is taken equally often, except
+/// for a remainder that is drawn without repetition.
 fn resampled(mut points: Vec<Point>, level: f64, rng: &mut Sequence) -> Vec<Point> {
     points.retain(|point| point.margin <= level);
-    // Fisher and Yates.
+    // Fisher–Yates shuffle.
     for i in (1..points.len()).rev() {
         points.swap(i, (rng.unit() * (i + 1) as f64) as usize);
     }
@@ -277,7 +282,7 @@ mod tests {
     /// Length of a run of the plant below, in steps.
     const STEPS: usize = 50;
 
-    /// x₀ = 0, xₖ₊₁ = 0.9 xₖ + zₖ: how far it stays below `limit`, at its highest.
+    /// The plant x₀ = 0, xₖ₊₁ = 0.9 xₖ + zₖ: its least distance below `limit`.
     fn least_distance(limit: f64, z: impl IntoIterator<Item = f64>) -> f64 {
         let mut x = 0.0;
         let mut least = f64::INFINITY;
@@ -292,9 +297,9 @@ mod tests {
         elementary::exp(-0.5 * x * x) / TAU.sqrt()
     }
 
-    /// The probability that the plant passes `limit`, without a drawn number: the density of x below it, carried on step
-    /// by step on a grid (Chapman and Kolmogorov, trapezoid rule), and what leaves by the tail of the normal
-    /// distribution.
+    /// The probability that the plant passes `limit`, computed without random numbers. The density of x below
+    /// the limit is propagated step by step on a grid (Chapman–Kolmogorov, trapezoid rule); the probability
+    /// that leaves is the tail of the normal distribution.
     fn passing(limit: f64) -> f64 {
         let n = 600;
         let (low, width) = (-limit, 2.0 * limit / f64::from(n));
@@ -313,11 +318,11 @@ mod tests {
         passed
     }
 
-    /// The same where z is uniform from -1 to 1: the distribution of x below the limit, carried on by its differences
-    /// (f(y) = (F((y + 1) / 0.9) - F((y - 1) / 0.9)) / 2, trapezoid rule), and what leaves.
+    /// The same for z uniform on [-1, 1]. The distribution function of x below the limit is propagated by its
+    /// differences (f(y) = (F((y + 1) / 0.9) - F((y - 1) / 0.9)) / 2, trapezoid rule).
     fn passing_of_uniform(limit: f64) -> f64 {
         let n = 4000;
-        // Nothing is below -10, the sum of all that is least.
+        // Nothing is below -10, the sum if every z is -1.
         let width = (limit + 10.0) / n as f64;
         let at = |i: usize| width * i as f64 - 10.0;
         let mut below: Vec<f64> = (0..=n).map(|i| f64::midpoint(at(i), 1.0).clamp(0.0, 1.0)).collect();
@@ -356,8 +361,9 @@ mod tests {
         (low, passing(low))
     }
 
-    /// Repeats of the whole, by other seeds: how many intervals cover `truth`; mean of the estimates; mean of the parts of
-    /// plain sampling's points that an equal deviation takes here.
+    /// Repeats the whole estimate with other seeds. Returns how many intervals cover `truth`, the mean of the
+    /// estimates, and the mean ratio of the points used to those that plain sampling needs for the same
+    /// deviation.
     fn judged(
         truth: f64,
         times: u64,
@@ -378,8 +384,8 @@ mod tests {
         (covered, mean, part)
     }
 
-    /// The intervals cover what is known, the estimates are right in the mean, and plain sampling takes 1e5 times the
-    /// steps. `tests/nightly` has a hundred seeds.
+    /// The intervals cover the known probability, the mean estimate is right, and plain sampling needs 1e5
+    /// times the points. `tests/nightly` uses a hundred seeds.
     fn covers([dimensions, seeds]: [usize; 2], passing: fn(f64) -> f64) {
         let (limit, truth) = limit(1e-9, passing);
         let times = std::env::var("PUNCTUAL_REPEATS").map_or(4, |n| n.parse().expect("a number"));
@@ -388,7 +394,8 @@ mod tests {
             least_distance(limit, z.iter().copied().chain(seeds.iter().map(uniform)))
         };
         let (covered, mean, part) = judged(truth, times, &noise, [dimensions, seeds]);
-        // One in twenty may miss it. Of 4 three do so once in 2000 times, of 100 thirteen likewise.
+        // An interval misses with probability 1/20. Three of 4 miss once in 2000 times, and so do thirteen of
+        // 100.
         assert!(times - covered <= 2 + times / 10, "{covered} of {times}");
         assert!((mean / truth - 1.0).abs() < 0.6 / (times as f64).sqrt(), "{mean}");
         assert!(part < 1e-5, "{part}");
@@ -399,7 +406,7 @@ mod tests {
         covers([STEPS, 0], passing);
     }
 
-    /// Noise in pieces, each with a seed.
+    /// Noise in pieces, each with its own seed.
     #[test]
     fn intervals_cover_that_of_noise_by_seeds() {
         covers([0, STEPS], passing_of_uniform);

@@ -12,34 +12,34 @@ use crate::error::Error;
 /// The 0.975 quantile of the normal distribution, for a confidence of 95 %.
 const Z: f64 = 1.959_963_984_540_054;
 
-/// A part of all runs.
+/// A fraction of all runs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Rate {
     /// Number of runs.
     pub count: u64,
-    /// Their part of all.
+    /// Their fraction of all runs.
     pub rate: f64,
-    /// Interval for the part in infinitely many runs, with a confidence of 95 %: E. B. Wilson, J. Amer. Statist.
-    /// Assoc. 22 (1927), doi 10.1080/01621459.1927.10502953. It is for independent runs; for spread ones it is
-    /// wider than need be.
+    /// Interval for the fraction in infinitely many runs, at a confidence of 95 %: E. B. Wilson, J. Amer.
+    /// Statist. Assoc. 22 (1927), doi 10.1080/01621459.1927.10502953. It assumes independent runs. For
+    /// stratified sampling it is wider than necessary.
     pub interval: [f64; 2],
 }
 
 impl Rate {
-    /// The rate of `count` runs of `all` ≥ 1.
+    /// The rate of `count` runs out of `all` ≥ 1.
     pub fn of(count: u64, all: u64) -> Self {
         let (n, p) = (all as f64, count as f64 / all as f64);
         let middle = p + Z * Z / (2.0 * n);
         let half = Z * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt();
         let scale = 1.0 + Z * Z / n;
-        // At 0 and `all` the ends are exact, round-off apart.
+        // At 0 and `all` the ends are exact up to round-off, so they are set.
         let low = if count == 0 { 0.0 } else { ((middle - half) / scale).max(0.0) };
         let high = if count == all { 1.0 } else { ((middle + half) / scale).min(1.0) };
         Self { count, rate: p, interval: [low, high] }
     }
 }
 
-/// The numbers of a column.
+/// The spread of the numbers in a column.
 #[derive(Clone, Debug, Serialize)]
 pub struct Spread {
     /// The column.
@@ -56,7 +56,7 @@ pub struct Spread {
     pub max: f64,
 }
 
-/// Number of runs that lack something that every run should have.
+/// How many runs lack a property that every run should have.
 #[derive(Clone, Debug, Serialize)]
 pub struct Lack {
     /// The column that is false.
@@ -73,14 +73,15 @@ pub struct Case {
     pub run: u64,
     /// Whether it succeeded all the same.
     pub success: bool,
-    /// Least h of all barriers from their deadlines on; `None` where one was never reached.
+    /// Least h of all barriers from their deadlines on; `None` if some barrier has no such value.
     pub least_h: Option<f64>,
     /// The call that ended it.
     pub failure: Option<String>,
 }
 
 impl Case {
-    /// Orders cases, worse ones greater: failed runs first, then those without success, then by the least h.
+    /// Orders cases by how bad they are: failed runs greatest, then those without success, then by the least
+    /// h.
     fn compare(&self, other: &Self) -> Ordering {
         let key = |case: &Self| (case.failure.is_some(), !case.success);
         let least = |case: &Self| case.least_h.unwrap_or(f64::NEG_INFINITY);
@@ -89,7 +90,7 @@ impl Case {
     }
 }
 
-/// A case ordered so that the least bad is at the top of the heap.
+/// A case, ordered so that the least bad one is at the top of the heap.
 struct Kept(Case);
 
 impl Ord for Kept {
@@ -124,13 +125,13 @@ pub struct Summary {
     pub failure: Rate,
     /// The columns that are false in some runs.
     pub lacks: Vec<Lack>,
-    /// The numbers of the runs.
+    /// The spreads of the columns with numbers.
     pub spreads: Vec<Spread>,
     /// The worst runs, the worst first.
     pub worst: Vec<Case>,
 }
 
-/// Goes through the rows in `reader` once, and keeps the `worst` so many.
+/// Reads the rows from `reader` once, and keeps the `worst` so many.
 ///
 /// # Errors
 ///
@@ -168,7 +169,7 @@ pub fn summary(reader: &Reader, measures: &Measures, worst: usize) -> Result<Sum
                 Cell::Number(h) => h,
                 _ => None,
             };
-            // A barrier that was released before its deadline has none.
+            // A barrier that was released before its deadline has no value and does not count.
             let least_h = least.iter().filter_map(h).reduce(f64::min);
             let failed = match &row[failure] {
                 Cell::Text(text) => text.clone(),
@@ -204,7 +205,7 @@ impl Spread {
         Self { column, unit, count: 0, min: f64::INFINITY, mean: 0.0, max: f64::NEG_INFINITY }
     }
 
-    /// Takes a value. Until the spread is finished, its mean is the sum.
+    /// Adds a value. Until the spread is finished, `mean` holds the sum.
     fn take(&mut self, value: f64) {
         self.count += 1;
         self.min = self.min.min(value);

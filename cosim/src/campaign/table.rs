@@ -1,7 +1,7 @@
-//! The rows of a campaign as a Parquet file. The only module that names the crate `parquet`.
+//! The rows of a campaign as a Parquet file. The only module that uses the crate `parquet`.
 //!
-//! Rows are in the order of the runs, in groups of [`GROUP`]. The file depends on columns, metadata and rows
-//! alone, so the same rows give the same bytes.
+//! Rows are in the order of the runs, in groups of [`GROUP`]. The file depends only on the columns, metadata
+//! and rows, so the same rows give the same bytes.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -41,7 +41,7 @@ pub enum Kind {
 pub struct Column {
     /// Its name, unique.
     pub name: String,
-    /// The unit of its numbers; empty where it has none.
+    /// The unit of its numbers; empty if it has none.
     pub unit: String,
     /// Its meaning.
     pub description: String,
@@ -64,7 +64,7 @@ pub enum Cell {
 }
 
 impl Cell {
-    /// Whether two cells are the same bit for bit.
+    /// Whether two cells are bitwise equal.
     pub fn is(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Count(a), Self::Count(b)) => a == b,
@@ -91,10 +91,10 @@ impl std::fmt::Display for Cell {
 /// A run: one cell for each column.
 pub type Row = Vec<Cell>;
 
-/// The name of the checksum of all rows in the metadata.
+/// The key of the checksum of all rows in the metadata.
 const CHECKSUM: &str = "punctual.checksum";
 
-/// A checksum of rows, in their order: what a disk or a copy has changed shows.
+/// A checksum of rows in their order, which reveals damage by a disk or a copy.
 #[derive(Default)]
 pub(super) struct Checksum(crc32fast::Hasher);
 
@@ -114,13 +114,13 @@ impl Checksum {
         }
     }
 
-    /// The text in the metadata.
+    /// Its text form in the metadata.
     pub(super) fn text(&self) -> String {
         format!("{:08x}", self.0.clone().finalize())
     }
 }
 
-/// A file that cannot be written or read as Parquet.
+/// The error for a file that cannot be written or read as Parquet.
 fn broken(action: &'static str, path: &Path) -> impl Fn(ParquetError) -> Error {
     move |e| Error::io(action, path, std::io::Error::other(e))
 }
@@ -136,7 +136,7 @@ pub(super) struct Writer {
 }
 
 impl Writer {
-    /// Begins the file at `path`, with texts by name in its metadata.
+    /// Begins the file at `path`, with `texts` by name in its metadata.
     ///
     /// # Errors
     ///
@@ -281,13 +281,13 @@ impl Reader {
         Ok(Self { path: path.to_owned(), inner })
     }
 
-    /// The text of this name in the metadata.
+    /// The text with this key in the metadata.
     pub fn text(&self, key: &str) -> Option<&str> {
         let texts = self.inner.metadata().file_metadata().key_value_metadata()?;
         texts.iter().find(|text| text.key == key)?.value.as_deref()
     }
 
-    /// Whether this is the checksum that was written with the rows.
+    /// Whether `rows` is the checksum that was written with the rows.
     pub(super) fn is_whole(&self, rows: &Checksum) -> bool {
         self.text(CHECKSUM) == Some(&rows.text())
     }
@@ -302,7 +302,7 @@ impl Reader {
         self.inner.metadata().num_row_groups()
     }
 
-    /// The rows of one group, of these columns.
+    /// These columns of the rows of one group.
     ///
     /// # Errors
     ///
@@ -349,7 +349,7 @@ impl Reader {
     }
 }
 
-/// The cells of a column of a row group; `None` where one is missing.
+/// The cells of a column in a row group; `None` for a missing one.
 fn cells<T: DataType>(
     group: &dyn parquet::file::reader::RowGroupReader,
     column: usize,

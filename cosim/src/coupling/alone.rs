@@ -1,4 +1,5 @@
-//! A filter's file as a system: the filter, the plant that its model is, and the nominal controller that is in it.
+//! Turns a filter's file into a system: the filter, the plant given by its model, and the nominal controller
+//! in the file.
 
 use punctual_fmu::configuration::Configuration;
 
@@ -8,7 +9,8 @@ use crate::error::Error;
 ///
 /// # Errors
 ///
-/// A configuration that is no filter, a plant that cannot be simulated, a start or controller that does not fit it.
+/// A configuration that is no filter, a plant that cannot be simulated, a start or controller that does not
+/// fit the plant.
 pub fn alone(configuration: Configuration) -> Result<(String, Vec<Configuration>), Error> {
     let Configuration::Filter(filter) = configuration else {
         let message = format!(
@@ -18,7 +20,7 @@ pub fn alone(configuration: Configuration) -> Result<(String, Vec<Configuration>
         return Err(Error::configuration("kind", message));
     };
     let (plant, controller) = filter.alone()?;
-    // What a barrier follows stays where it starts: nothing here moves it.
+    // Nothing in this system moves what a barrier follows, so it stays where it starts.
     let start: Vec<_> =
         filter.barrier_inputs().iter().map(|input| format!("{:?} = {:?}", input.name, input.start)).collect();
     let experiment = filter.experiment;

@@ -1,20 +1,20 @@
 //! The order of components within a communication step.
 //!
 //! An output has direct feedthrough if it depends on an input at the same instant. A component with such an
-//! output must run before each reader of it, and after each component that feeds it. All others keep their
-//! outputs until they step, so they run last, in any order. The order is a topological one of the signals that
-//! leave feedthrough outputs. Where these form a cycle, the cycle is cut at its first component in file order,
-//! and the signals into it are read one step late.
+//! output must run before each reader of it, and after each component that feeds it. All other components
+//! keep their outputs until they step, so they run last, in any order. The order is a topological one of the
+//! signals that come from feedthrough outputs. If these form a cycle, it is cut at its first component in
+//! file order, and the signals into that component are read one step late.
 
 /// A signal between two components.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Edge {
-    /// The component that gives it.
+    /// The component whose output it is.
     pub(super) from: usize,
     /// The component that reads it.
     pub(super) to: usize,
-    /// Whether an output of `to` depends directly on it. Signals that only act through the state are kept
-    /// undelayed where possible, but never cut a chain of direct ones.
+    /// Whether an output of `to` depends on it directly. Signals that act only through the state are kept
+    /// undelayed if possible, but never at the cost of cutting a chain of direct ones.
     pub(super) direct: bool,
 }
 
@@ -37,8 +37,8 @@ pub(super) fn order(members: &[usize], edges: &[Edge]) -> Vec<usize> {
     order
 }
 
-/// The position in `waiting` of the first component of a cycle of direct edges that nothing else waiting leads
-/// into. Such a cycle exists whenever every component waits for another.
+/// The position in `waiting` of the first component of a cycle of direct edges that no other waiting
+/// component leads into. Such a cycle exists whenever every component waits for another.
 fn first_of_a_cycle(waiting: &[usize], edges: &[Edge]) -> usize {
     let reached_from = |start: usize| {
         let mut reached = vec![start];

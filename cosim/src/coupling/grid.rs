@@ -3,7 +3,7 @@
 /// The greatest number of steps of a run.
 pub(super) const MAX_STEPS: f64 = 1e12;
 
-/// Distance, in steps, from a whole number of steps within which an experiment still counts as whole. The
+/// Tolerance, in steps, within which the duration of an experiment counts as a whole number of steps. The
 /// rounding error of (stop − start)/h is below it up to about 10⁹ steps.
 const WHOLE: f64 = 1e-6;
 
@@ -18,8 +18,8 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Points from `start` to `stop` (s, finite, `start < stop`) in steps of `step` (s, > 0); the
-    /// last step is shortened where `step` does not divide the time.
+    /// Points from `start` to `stop` (s, finite, `start < stop`) at intervals of `step` (s, > 0). The last
+    /// step is shortened if `step` does not divide the duration.
     pub fn new(start: f64, stop: f64, step: f64) -> Self {
         let ratio = (stop - start) / step;
         let whole = ratio.round();
@@ -45,7 +45,7 @@ impl Grid {
         if k + 1 < self.steps { self.step } else { self.last }
     }
 
-    /// The last step, in seconds, where it is shorter than the others.
+    /// The last step, in seconds, if it is shorter than the others.
     pub fn shortened(&self) -> Option<f64> {
         (self.last != self.step).then_some(self.last)
     }

@@ -1,5 +1,5 @@
-//! One of our own blocks as a participant, without an archive, a library or C. The state machine is the one that
-//! the shared library runs, so the numbers are the same bit for bit.
+//! Runs one of this program's blocks as a participant, without an archive, a library or C. The state machine
+//! is the one that the shared library runs, so the numbers are the same bit for bit.
 
 use punctual_fmu::configuration::Configuration;
 use punctual_fmu::instance::{Instance, Place};
@@ -13,9 +13,9 @@ use crate::host::{Causality, DataType};
 pub struct InProcess {
     name: String,
     instance: Instance,
-    /// What the user should know of the run.
+    /// A note to the user on the run.
     notice: Option<String>,
-    /// Whole numbers and truth values on their way.
+    /// Buffer for integers and Booleans.
     whole: Vec<i32>,
 }
 
@@ -31,14 +31,15 @@ impl InProcess {
         Ok(Self { name: name.to_owned(), instance, notice, whole: Vec::new() })
     }
 
-    /// The error of a refused call: the instance, the call and the time.
+    /// The error for a refused call, with the instance, the call and the time.
     #[cold]
     fn refused(&self, call: &str, reason: &str) -> Error {
         let time = crate::error::brief_time(self.instance.time());
         Error::broken(format!("{call} of {} at t = {time} s", self.name), format!("was refused: {reason}"))
     }
 
-    /// The same of a call that touches `places`: that of the first one's type, among those of reals, integers and booleans.
+    /// The error for a refused call on `places`. It names the call for the type of the first place: real,
+    /// integer or boolean.
     #[cold]
     fn refused_at(&self, places: &[Place], [real, integer, boolean]: [&str; 3], reason: &str) -> Error {
         let call = match places.first() {
@@ -50,7 +51,7 @@ impl InProcess {
     }
 }
 
-/// Passes calls on to the instance, which answers them under the same name.
+/// Passes calls on to the instance's methods of the same name.
 macro_rules! calls {
     ($($method:ident($($argument:ident: $kind:ty),*) as $call:literal;)*) => {$(
         fn $method(&mut self, $($argument: $kind),*) -> Result<(), Error> {
@@ -71,7 +72,7 @@ impl Participant for InProcess {
         Ok(())
     }
 
-    /// A block has no solver that takes a tolerance.
+    /// A block has no solver, so the tolerance is ignored.
     fn setup_experiment(
         &mut self,
         start_time: f64,
@@ -114,7 +115,7 @@ impl Participant for InProcess {
             return done.map_err(|reason| self.refused("fmi2SetReal", &reason));
         }
         self.whole.clear();
-        // A number beyond 32 bits becomes one that the variable refuses.
+        // A number beyond 32 bits is clamped to one that the variable refuses.
         self.whole.extend(values.iter().map(|value| *value as i32));
         let (call, done) = match of {
             DataType::Boolean => ("fmi2SetBoolean", self.instance.set_boolean(references, &self.whole)),

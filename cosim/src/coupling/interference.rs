@@ -1,4 +1,4 @@
-//! How much a filter changes what is wanted: at how many samples, and by how much.
+//! How often a filter changes the wanted input, and by how much.
 
 use std::collections::BTreeMap;
 
@@ -11,9 +11,10 @@ use super::promises::is_filter;
 use super::system::{Order, System};
 use crate::host::{Causality, Description};
 
-/// Difference of an input from what was wanted that is none, beside its size: round-off of a unit that is converted.
+/// Difference from the wanted input that counts as no change, relative to 1 + its size. It allows for
+/// round-off in unit conversions.
 const SAME: f64 = 1e-9;
-/// Bounds of an input from which on it has none.
+/// Magnitude of a bound from which the input counts as unbounded.
 const UNBOUNDED: f64 = 1e29;
 
 /// What a filter has changed.
@@ -23,19 +24,20 @@ pub struct Interference {
     pub filter: String,
     /// Samples with a valid input.
     pub samples: u64,
-    /// Those of them at which an input was not what was wanted.
+    /// Number of those at which an input differed from the wanted one.
     pub changed: u64,
-    /// By how much in the mean of these, the input that was changed most at each, as a part of the width of its bounds; `None` where
-    /// none has both.
+    /// Mean change over these samples, relative to the width of the bounds. Each sample counts its
+    /// most-changed input. `None` if no sample was changed or no input has both bounds.
     pub mean: Option<f64>,
-    /// The most at one of them.
+    /// The largest such change.
     pub most: Option<f64>,
-    /// The barriers for which it was changed, and at how many of them, where the filter follows plans.
+    /// For a filter that follows backup plans: the barriers for which inputs were changed, and at how many
+    /// samples each.
     pub reasons: BTreeMap<String, u64>,
 }
 
 impl Interference {
-    /// In a sentence.
+    /// The findings as one sentence.
     pub fn text(&self) -> String {
         let Self { filter, samples, changed, .. } = self;
         if *changed == 0 {
@@ -60,14 +62,14 @@ impl Interference {
     }
 }
 
-/// An input of a filter: as wanted, as given, and the width of its bounds.
+/// An input of a filter: the wanted value, the given value, and the width of its bounds.
 struct Pair<P> {
     wanted: P,
     given: P,
     width: Option<f64>,
 }
 
-/// The ports of a filter that tell.
+/// The ports of a filter that show what it changes.
 pub(super) struct Ports {
     component: usize,
     name: String,
@@ -88,12 +90,12 @@ impl Ports {
 pub(super) struct Watched {
     name: String,
     status: usize,
-    /// The number of the barrier for which it was changed, and the names of all.
+    /// The slot with the number of the barrier that caused a change, and the names of all barriers.
     reason: Option<usize>,
     barriers: Vec<String>,
     pairs: Vec<Pair<usize>>,
     prompt: bool,
-    /// What was wanted at the last point.
+    /// The wanted inputs at the last point.
     last: Option<Vec<f64>>,
     samples: u64,
     changed: u64,
@@ -102,7 +104,7 @@ pub(super) struct Watched {
     reasons: BTreeMap<String, u64>,
 }
 
-/// Those of all filters in `system`.
+/// The ports of all filters in `system`.
 pub(super) fn ports(system: &System, descriptions: &[&Description], links: &[Link]) -> Vec<Ports> {
     let of = |(component, description): (usize, &&Description)| {
         let variable = |name: &str| description.index_of(name).map(|variable| Port { component, variable });
@@ -129,7 +131,7 @@ pub(super) fn ports(system: &System, descriptions: &[&Description], links: &[Lin
         let (name, reason) = (owner.name.clone(), variable("reason"));
         Some(Ports { component, name, status, reason, barriers, pairs, prompt })
     };
-    // What nothing feeds and nobody wants is no controller's.
+    // A filter whose wanted inputs are neither connected nor set has no controller to interfere with.
     let is_wanted = |ports: &Ports| {
         let is_fed = |port: Port| links.iter().any(|link| link.to == port);
         let starts = &system.components()[ports.component].start;
@@ -140,7 +142,7 @@ pub(super) fn ports(system: &System, descriptions: &[&Description], links: &[Lin
 }
 
 impl Watched {
-    /// `None` where a port has no slot.
+    /// `None` if a port has no slot.
     pub(super) fn new(layout: &Layout, ports: &Ports) -> Option<Self> {
         let pair = |pair: &Pair<Port>| {
             let Pair { wanted, given, width } = *pair;
@@ -162,13 +164,13 @@ impl Watched {
         })
     }
 
-    /// Forgets the run before.
+    /// Forgets the last run.
     pub(super) fn reset(&mut self) {
         (self.last, self.samples, self.changed, self.total, self.most) = (None, 0, 0, 0.0, 0.0);
         self.reasons.clear();
     }
 
-    /// Takes the `values` of a communication point.
+    /// Evaluates the `values` of a communication point.
     pub(super) fn see(&mut self, values: &[f64]) {
         let now: Vec<f64> = self.pairs.iter().map(|pair| values[pair.wanted]).collect();
         let wanted = if self.prompt { Some(now.clone()) } else { self.last.take() };
@@ -180,7 +182,7 @@ impl Watched {
         let (mut far, mut is_changed) = (0.0_f64, false);
         for (pair, wanted) in self.pairs.iter().zip(&wanted) {
             let by = (values[pair.given] - wanted).abs();
-            // NaN was not wanted.
+            // NaN counts as a change.
             if by <= SAME * (1.0 + wanted.abs()) {
                 continue;
             }

@@ -1,4 +1,4 @@
-//! Slots of signals, and the recording of slots as rows.
+//! Assigns slots to signals, and records slots as rows.
 
 use super::network::{self, Link, Port};
 use super::ports::{Group, Source};
@@ -23,9 +23,9 @@ impl Layout {
         self.ports.iter().position(|other| *other == port)
     }
 
-    /// Gives slots to the variables of a component that are connected or `read`; of an array to all elements as soon as one
-    /// needs it. The groups are outputs without feedthrough, outputs with feedthrough, connected inputs, and others that
-    /// are read.
+    /// Assigns slots to the variables of a component that are connected or `read`. An array gets slots for
+    /// all elements as soon as one is needed. The groups are outputs without feedthrough, outputs with
+    /// feedthrough, connected inputs, and other variables that are read.
     pub(super) fn add(
         &mut self,
         system: &System,
@@ -69,8 +69,9 @@ impl Layout {
         })
     }
 
-    /// The slots of a component that no link feeds and that are not read before the run begins, each with its start value.
-    /// There are such slots of inputs where other elements of the same array are fed.
+    /// The slots of a component that no link feeds and that are not read before the run begins, each with its
+    /// start value. They belong to inputs that are elements of an array of which only other elements are
+    /// connected.
     pub(super) fn constants(
         &self,
         component: usize,
@@ -95,7 +96,7 @@ impl Layout {
             .collect()
     }
 
-    /// The enumerations of a component that are fed by something with other items.
+    /// The enumeration inputs of a component whose source may have values other than their items.
     pub(super) fn choices(
         &self,
         component: usize,
@@ -124,7 +125,7 @@ impl Layout {
     }
 }
 
-/// An enumeration that is an input.
+/// An enumeration input.
 pub(super) struct Choice {
     pub(super) slot: usize,
     /// The numbers of its items; at least one.
@@ -138,7 +139,7 @@ impl Choice {
         self.items.contains(&values[self.slot])
     }
 
-    /// The error of a value that is none.
+    /// The error for a value that is not an item.
     #[cold]
     pub(super) fn error(&self, names: &[String], values: &[f64]) -> Error {
         let (name, value) = (&names[self.slot], values[self.slot]);
@@ -148,11 +149,11 @@ impl Choice {
     }
 }
 
-/// Records a row where one is due.
+/// Records rows when they are due.
 pub(super) struct Recorder<'a> {
     every: u64,
     last: u64,
-    /// The last point at which a row was due or passed over.
+    /// The last point reached, whether its row was recorded or skipped.
     pub(super) reached: u64,
     slots: Vec<usize>,
     row: Vec<f64>,
@@ -162,8 +163,8 @@ pub(super) struct Recorder<'a> {
 }
 
 impl<'a> Recorder<'a> {
-    /// Records `slots` as `columns`, `every` so many of `last` steps and at the last point. They are stored with
-    /// `keep` only; `observer` sees all of them.
+    /// Records `slots` as `columns` at every `every`-th of `last` steps and at the last point. Rows are
+    /// stored only if `keep` is set; `observer` sees all of them.
     pub(super) fn new(
         columns: &[Column],
         slots: &[usize],
@@ -188,7 +189,7 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Has point `k` be the last of the run.
+    /// Makes point `k` the last one of the run.
     pub(super) fn end_at(&mut self, k: u64) {
         self.last = k;
     }

@@ -8,10 +8,10 @@
 //! 3. these components: `doStep(t_k, h)`; then all outputs without feedthrough are read (t_{k+1}).
 //!
 //! So the sample that a feedthrough component computes from the state at t_k acts over [t_k, t_k + h]. No
-//! component sees a state of t_{k+1} before all have reached it.
+//! component sees a state at t_{k+1} before all have reached it.
 //!
-//! Jacobi order: at t_k all inputs are set to the values read after the previous step, the row is recorded, all
-//! step, all is read.
+//! In Jacobi order, all inputs are set at t_k to the values read after the previous step. Then the row is
+//! recorded, all components step, and all outputs are read.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -46,17 +46,18 @@ struct Member<P> {
     /// Outputs with feedthrough.
     direct: Group,
     inputs: Group,
-    /// What is read beside outputs, such as local variables. The standard lets nobody read them during the initialisation.
+    /// Variables other than outputs that are read, such as local ones. The standard does not allow reading
+    /// them during initialisation.
     others: Group,
     sources: Vec<Source>,
-    /// The enumerations that something with other items feeds.
+    /// The enumeration inputs whose sources may have values other than their items.
     choices: Vec<Choice>,
-    /// Slots of elements of connected arrays that are not connected themselves, and their values.
+    /// The slots and values of unconnected elements of connected arrays.
     constants: Vec<(usize, f64)>,
 }
 
 impl<P: Participant> Member<P> {
-    /// Takes over what feeds its inputs.
+    /// Copies the sources into its inputs.
     fn set_inputs(&mut self, values: &mut [f64], names: &[String]) -> Result<(), Error> {
         for source in &self.sources {
             source.transfer(values);
@@ -67,7 +68,8 @@ impl<P: Participant> Member<P> {
         self.inputs.write(&mut self.participant, values)
     }
 
-    /// The same during the initialisation, where a source may have no value yet. Then an enumeration keeps its start value.
+    /// Does the same during initialisation, when a source may have no value yet. An enumeration then keeps
+    /// its start value.
     fn set_first_inputs(&mut self, values: &mut [f64]) -> Result<(), Error> {
         for source in &self.sources {
             source.transfer(values);
@@ -80,7 +82,7 @@ impl<P: Participant> Member<P> {
         self.inputs.write(&mut self.participant, values)
     }
 
-    /// Sets its start values: those of structural parameters, or the others.
+    /// Sets its start values: those of structural parameters if `structural`, else the others.
     fn set_starts(&mut self, structural: bool) -> Result<(), Error> {
         let participant = &mut self.participant;
         let mut starts = self.starts.iter().filter(|start| start.structural == structural).peekable();
@@ -117,32 +119,33 @@ pub struct Simulation<P = Box<dyn Participant>> {
     /// The name of each slot.
     names: Vec<String>,
     promises: Vec<Watched>,
-    /// How much filters change what is wanted.
+    /// Measures how much each filter changes the wanted inputs.
     interference: Vec<interference::Watched>,
-    /// Whether each slot has been reported as not finite.
+    /// For each slot, whether it was already reported as not finite.
     reported: Vec<bool>,
     notes: Vec<String>,
-    /// How many of the notes are [`Self::warnings`], the first ones.
+    /// The number of notes, counted from the first, that are [`Self::warnings`].
     warnings: usize,
-    /// Notes that hold for every run.
+    /// The number of notes that hold for every run.
     standing_notes: usize,
     used: bool,
     /// Values that change in a run.
     sequences: Vec<Sequence>,
-    /// Set by somebody else to end a run.
+    /// A flag that another thread sets to end a run.
     stop: Option<Arc<AtomicBool>>,
 }
 
-/// The sequence of values of a Real input or tunable parameter in a run, each for as many steps.
+/// A sequence of values that a Real input or tunable parameter takes during a run, each for the same number
+/// of steps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sequence {
     /// Position of the component.
     pub component: usize,
     /// Value reference.
     pub reference: u32,
-    /// Steps for which a value lasts, ≥ 1.
+    /// Number of steps that each value lasts, ≥ 1.
     pub steps: u64,
-    /// The values; the first is the one at the start, and the last one stays.
+    /// The values. The first is the start value; the last stays until the end.
     pub values: Vec<f64>,
 }
 
@@ -155,11 +158,11 @@ pub struct Outcome {
     pub statistics: Statistics,
     /// The promises of the filters, in the order of the components.
     pub promises: Vec<Promise>,
-    /// How much each filter changed what was wanted.
+    /// How much each filter changed the wanted inputs.
     pub interference: Vec<Interference>,
     /// Notes for the user: signals read late, values that are not finite, warnings.
     pub notes: Vec<String>,
-    /// The FMI call that ended the run before its stop time, if one did. The rows until then are kept.
+    /// The FMI call that ended the run before its stop time, if any. The rows until then are kept.
     pub failure: Option<Error>,
 }
 
@@ -174,7 +177,7 @@ pub struct Statistics {
     pub wall_time: Duration,
 }
 
-/// What `participant` has to say, with its name.
+/// The remark of `participant` on the run, with its name.
 fn remark(participant: &impl Participant) -> Option<String> {
     participant.remark().map(|remark| format!("{}: {remark}", participant.name()))
 }
@@ -187,8 +190,8 @@ impl Statistics {
 }
 
 impl Simulation<Box<dyn Participant>> {
-    /// Opens the FMUs of `system` and its configurations, which `read` reads, found relative to the folder `base`, and
-    /// instantiates them. Returns them too, in the order of the components.
+    /// Opens the FMUs of `system`, reads its configurations with `read`, and instantiates all of them. Paths
+    /// are relative to the folder `base`. Also returns the models, in the order of the components.
     ///
     /// # Errors
     ///
@@ -215,7 +218,7 @@ impl Simulation<Box<dyn Participant>> {
     ///
     /// # Errors
     ///
-    /// As for [`Simulation::new`]; or not one model for each component.
+    /// As for [`Simulation::new`], or if there is not one model for each component.
     pub fn of(system: &System, models: &[Model]) -> Result<Self, Error> {
         let descriptions: Vec<_> = models.iter().map(Model::description).collect();
         promises::check_fed(system, &descriptions, &network::links(system, &descriptions)?, &[])?;
@@ -224,7 +227,7 @@ impl Simulation<Box<dyn Participant>> {
             models[c].instance(name).map_err(|e| e.in_component(name))
         })?;
         let notes = models.iter().filter_map(Model::configuration).flat_map(Configuration::in_degrees);
-        // The start in the file of a filter is that of its plant.
+        // The start in a filter's file is also the start of its plant, so both give the same note.
         let notes: BTreeSet<_> = notes.collect();
         simulation.notes.extend(notes);
         simulation.standing_notes = simulation.notes.len();
@@ -238,7 +241,7 @@ impl<P: Participant> Simulation<P> {
     ///
     /// # Errors
     ///
-    /// As for [`Simulation::new`]; or not one description for each component.
+    /// As for [`Simulation::new`], or if there is not one description for each component.
     pub fn assembled(
         system: &System,
         descriptions: &[&Description],
@@ -251,7 +254,7 @@ impl<P: Participant> Simulation<P> {
         let Network { links, mut starts, recorded, direct, delayed, notes, remarks } =
             network::resolve(system, descriptions)?;
 
-        // Give slots to all signals that are recorded, watched or connected.
+        // Assign slots to all signals that are recorded, watched or connected.
         let watched = promises::ports(system, descriptions, &links);
         let mut read = recorded.clone();
         let of_plans = |ports: &promises::Ports| ports.plans.into_iter().flatten();
@@ -293,7 +296,8 @@ impl<P: Participant> Simulation<P> {
                 sources: layout.sources(component, &links),
             });
         }
-        // The simulation at its start, with notes that hold for every run: first those of the components.
+        // The simulation at its start, with the notes that hold for every run; those of the components come
+        // first.
         let mut standing: Vec<String> =
             members.iter().filter_map(|member| remark(&member.participant)).collect();
         let warnings = standing.len();
@@ -337,12 +341,13 @@ impl<P: Participant> Simulation<P> {
         Ok(simulation)
     }
 
-    /// What the components have to say before any run, each with its name: part of the notes of every run.
+    /// Remarks of the components before any run, each with the component's name. They are among the notes of
+    /// every run.
     pub fn warnings(&self) -> &[String] {
         &self.notes[..self.warnings]
     }
 
-    /// Gives a Real parameter or input another start value, from the next run on.
+    /// Changes the start value of a Real parameter or input, from the next run on.
     pub fn set_start(&mut self, component: usize, reference: u32, value: f64) {
         let starts = &mut self.members[component].starts;
         let start = Start::real(reference, value);
@@ -352,7 +357,8 @@ impl<P: Participant> Simulation<P> {
         }
     }
 
-    /// Gives Real inputs and tunable parameters sequences of values, from the next run on, in place of any before.
+    /// Sets sequences of values for Real inputs and tunable parameters from the next run on. They replace all
+    /// earlier sequences.
     pub fn set_sequences(&mut self, sequences: Vec<Sequence>) {
         for sequence in &sequences {
             if let Some(first) = sequence.values.first() {
@@ -374,7 +380,7 @@ impl<P: Participant> Simulation<P> {
         Ok(())
     }
 
-    /// Ends a run at the next step once `stop` is set; what was recorded until then is kept.
+    /// Makes a run end at the next step once `stop` is set. The rows until then are kept.
     pub fn stop_by(&mut self, stop: Arc<AtomicBool>) {
         self.stop = Some(stop);
     }
@@ -431,7 +437,7 @@ impl<P: Participant> Simulation<P> {
             if ran.is_ok() {
                 ran = member.participant.terminate();
             }
-            // What it said before the run is among the notes.
+            // A remark made before the run is already among the notes.
             let said = remark(&member.participant).filter(|remark| !self.notes.contains(remark));
             self.notes.extend(said);
         }
@@ -478,7 +484,7 @@ impl<P: Participant> Simulation<P> {
                 break;
             }
         }
-        // Feedthrough outputs at the stop time, for FMUs that compute them on reading.
+        // Read the feedthrough outputs at the stop time, for FMUs that compute them when read.
         recorder.end_at(end);
         for i in 0..self.direct.len() {
             let c = self.direct[i];
@@ -525,7 +531,7 @@ impl<P: Participant> Simulation<P> {
         Ok(())
     }
 
-    /// Whether an FMU asked for the end of the run in the step to point `k`; reported in a note.
+    /// Whether an FMU asked to end the run in the step to point `k`; if so, adds a note.
     fn is_ended(&mut self, k: u64) -> bool {
         let asking = self.members.iter().position(|member| member.participant.asks_to_end());
         asking.inspect(|c| self.note_end(*c, k)).is_some()
@@ -537,10 +543,10 @@ impl<P: Participant> Simulation<P> {
         self.notes.push(format!("{name} asked to end the run at t = {time} s (terminateSimulation)"));
     }
 
-    /// Sets start values and initialises. In initialization mode, outputs and inputs are passed on until nothing
-    /// changes, at most once for each component (enough wherever there is no loop).
+    /// Sets start values and initialises. In initialization mode, outputs are passed to inputs until nothing
+    /// changes, at most once for each component (enough if there is no loop).
     fn initialise(&mut self) -> Result<(), Error> {
-        // Forget the run before; deadlines may have start values.
+        // Forget the last run. The deadlines may have start values.
         self.notes.truncate(self.standing_notes);
         self.reported.fill(false);
         for watched in &mut self.promises {
@@ -551,7 +557,7 @@ impl<P: Participant> Simulation<P> {
             self.notes.extend(watched.reset(deadline, self.grid.step(0)));
         }
         self.interference.iter_mut().for_each(interference::Watched::reset);
-        // Set start values, and go to initialization mode.
+        // Set start values, and enter initialization mode.
         let used = std::mem::replace(&mut self.used, true);
         for member in &mut self.members {
             if used {
@@ -565,7 +571,7 @@ impl<P: Participant> Simulation<P> {
             }
             member.participant.enter_initialization_mode()?;
         }
-        // Pass outputs and inputs on until nothing changes.
+        // Pass outputs to inputs until nothing changes.
         let mut before: Vec<f64> = Vec::new();
         for _ in 0..=self.members.len() {
             for member in &mut self.members {
@@ -586,7 +592,7 @@ impl<P: Participant> Simulation<P> {
             }
             before.clone_from(&self.values);
         }
-        // Go to step mode.
+        // Enter step mode.
         for member in &mut self.members {
             member.participant.exit_initialization_mode()?;
         }
@@ -596,7 +602,7 @@ impl<P: Participant> Simulation<P> {
         Ok(())
     }
 
-    /// Records point `k` at `time`, and looks at the promises there.
+    /// Records point `k` at `time`, and evaluates the promises and the interference there.
     fn take(&mut self, recorder: &mut Recorder<'_>, k: u64, time: f64) {
         recorder.row(k, time, &self.values);
         self.promises.iter_mut().for_each(|watched| watched.see(time, &self.values));
@@ -644,7 +650,7 @@ impl<P: Participant> Simulation<P> {
         }
     }
 
-    /// Names outputs that are no numbers.
+    /// Adds a note on outputs that are not numbers, and so not recorded.
     fn note_what_is_not_recorded(&mut self, descriptions: &[&Description]) {
         for (member, description) in self.members.iter().zip(descriptions) {
             let outputs = description.outputs.iter().map(|output| &description.variables[output.variable]);

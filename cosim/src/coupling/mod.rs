@@ -1,5 +1,5 @@
-//! Couples FMUs. A system file says which FMUs, how they are wired and for how long; a fixed-step master runs
-//! them and records. Knows FMUs only through [`crate::host`], and steps any [`Participant`].
+//! Couples FMUs. A system file says which FMUs run, how they are connected and for how long; a fixed-step
+//! master runs them and records. It knows FMUs only through [`crate::host`], and steps any [`Participant`].
 
 mod alone;
 mod graph;

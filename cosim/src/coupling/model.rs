@@ -1,5 +1,5 @@
-//! What a component is made from: an FMU, or a configuration of this program, which runs in process without one. The
-//! numbers are the same, bit for bit.
+//! What a component is made from: an FMU, or a configuration of this program, which runs in process. Both
+//! give the same numbers, bit for bit.
 
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -13,7 +13,7 @@ use crate::error::Error;
 use crate::host::{Description, Fmu, Participant};
 use crate::text;
 
-/// A configuration with what an FMU of it would say.
+/// A configuration with the data of the FMU that it would make.
 pub struct Own {
     /// The configuration.
     pub configuration: Configuration,
@@ -42,29 +42,30 @@ impl Own {
     ///
     /// # Errors
     ///
-    /// None in practice: the GUID is the configuration's.
+    /// None in practice, since the GUID is the configuration's own.
     pub fn instance(&self, name: &str) -> Result<InProcess, Error> {
         InProcess::new(name, self.configuration.clone(), &self.guid)
     }
 }
 
-/// Reads a configuration from a file, with its plug-in.
+/// Reads a configuration and its plug-in from a file.
 pub type Reader = fn(&Path) -> Result<Configuration, Error>;
 
 /// An FMU, or a configuration that runs in process.
 pub enum Model {
-    /// An FMU, with the sizes of its arrays as this component has them.
+    /// An FMU, and its description with the array sizes of this component.
     Fmu(Rc<Fmu>, Rc<Description>),
-    /// A configuration, from this file.
+    /// A configuration and its file.
     Own(Box<Own>, PathBuf),
 }
 
 impl Model {
-    /// Opens the FMU at `path`, or reads the configuration, if the name ends in `.toml`. `shared` are those opened before.
+    /// Opens the FMU at `path`, or reads the configuration if the name ends in `.toml`. `shared` are the
+    /// models already opened.
     ///
     /// # Errors
     ///
-    /// A file that is not there or cannot be used.
+    /// A file that is missing or cannot be used.
     pub(super) fn open(path: &Path, shared: &[Self], read: Reader) -> Result<Self, Error> {
         if text::is_toml(path) {
             let own = Own::new(read(path)?)?;
@@ -81,7 +82,7 @@ impl Model {
         })
     }
 
-    /// The same, with the sizes that the start values of `component` give to arrays.
+    /// The same model, with the array sizes that the start values of `component` set.
     ///
     /// # Errors
     ///
@@ -93,7 +94,7 @@ impl Model {
         Ok(Self::Fmu(fmu, Rc::new(sized)))
     }
 
-    /// Its configuration, where it is one.
+    /// Its configuration, if it is one.
     pub fn configuration(&self) -> Option<&Configuration> {
         match self {
             Self::Fmu(..) => None,
@@ -101,7 +102,7 @@ impl Model {
         }
     }
 
-    /// The file that it is from.
+    /// The file it comes from.
     pub fn path(&self) -> &Path {
         match self {
             Self::Fmu(fmu, _) => fmu.path(),
@@ -117,11 +118,11 @@ impl Model {
         }
     }
 
-    /// What to tell of an FMU of this program that is not what the configuration beside it would become.
+    /// A warning if an FMU of this program does not match the configuration file beside it.
     pub fn stale(&self) -> Option<String> {
         let Self::Fmu(fmu, _) = self else { return None };
         let inside = fmu.resource(RESOURCE)?;
-        // A file that cannot be used is not what the FMU was made of, or is of something else.
+        // A file that cannot be used is not what the FMU was built from, or describes something else.
         let beside = fmu.path().with_extension("toml");
         let text = std::fs::read_to_string(&beside).ok()?;
         let outside = Configuration::parse(&text).and_then(|c| c.canonical()).ok()?;

@@ -1,5 +1,5 @@
-//! Resolves a system file against the descriptions of its FMUs. Names become positions, and every error says
-//! which field of the file it comes from. Runs nothing.
+//! Resolves a system file against the descriptions of its FMUs. Names become positions, and every error names
+//! the field of the file that it comes from. Nothing is run.
 
 use std::collections::BTreeMap;
 
@@ -26,26 +26,26 @@ pub struct Port {
 pub struct Link {
     /// An output.
     pub from: Port,
-    /// An input, of no other connection.
+    /// An input that no other connection feeds.
     pub to: Port,
     /// Units of the input per unit of the output.
     pub factor: f64,
     /// In the unit of the input.
     pub offset: f64,
-    /// What the units of its ends have to do with that.
+    /// How the units of its ends relate to the factor and offset.
     pub units: Units,
 }
 
-/// What the units of the ends of a connection have to do with its factor and offset.
+/// How the units of a connection's ends relate to its factor and offset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Units {
-    /// Nothing: they are the same, or the file says how the number is meant.
+    /// The units are the same, or the file says how to read the number.
     Same,
-    /// They make them.
+    /// The factor and offset convert between the units.
     Converted,
-    /// Nothing, since they cannot be compared.
+    /// The units cannot be compared.
     Unknown,
-    /// The file has another factor than this one, which they would make.
+    /// The file gives another factor than this one, which would convert between the units.
     Overruled(f64),
 }
 
@@ -63,17 +63,17 @@ pub(super) struct Network {
     pub(super) delayed: Vec<usize>,
     /// Notes for the user that hold in Gauss–Seidel order, such as a signal read one step late.
     pub(super) notes: Vec<String>,
-    /// Notes for the user on what is recorded and connected beside outputs.
+    /// Notes for the user on what is recorded and on connections from variables that are not outputs.
     pub(super) remarks: Vec<String>,
 }
 
-/// The greatest number of local variables of a component that are recorded where nobody says which.
+/// The greatest number of local variables of a component that are recorded if the file names no signals.
 const MAX_LOCALS: usize = 200;
 
 /// Resolves `system` against the descriptions of its components' FMUs, one for each, in order.
 pub(super) fn resolve(system: &System, descriptions: &[&Description]) -> Result<Network, Error> {
     let resolver = Resolver { system, descriptions };
-    // First, since the sizes of arrays follow from them.
+    // Start values come first, since the sizes of arrays depend on them.
     let of_component = |c: usize| {
         let component = &system.components()[c];
         let unknown = |name: &str| resolver.missing(c, name);
@@ -100,10 +100,10 @@ pub fn links(system: &System, descriptions: &[&Description]) -> Result<Vec<Link>
 
 /// Notes on `links` whose units differ, or cannot be compared.
 pub fn unit_notes(system: &System, descriptions: &[&Description], links: &[Link]) -> Vec<String> {
-    /// Most connections named of a pair of units.
+    /// The most connections named for each pair of units.
     const NAMED: usize = 8;
     let resolver = Resolver { system, descriptions };
-    // By kind and then by units.
+    // Grouped by kind, and then by units.
     let mut notes: BTreeMap<&str, BTreeMap<String, Vec<String>>> = BTreeMap::new();
     for link in links {
         let ends = [link.from, link.to].map(|port| (resolver.name(port), resolver.unit(port)));
@@ -144,7 +144,7 @@ pub fn unit_notes(system: &System, descriptions: &[&Description], links: &[Link]
     notes.into_iter().map(note).collect()
 }
 
-/// A number with six digits.
+/// The number rounded to six significant digits.
 fn brief(number: f64) -> f64 {
     format!("{number:.5e}").parse().unwrap_or(number)
 }
@@ -153,7 +153,7 @@ fn brief(number: f64) -> f64 {
 ///
 /// # Errors
 ///
-/// A component or variable that does not exist, with those that do.
+/// A component or variable that does not exist; the message lists those that do.
 pub fn port(system: &System, descriptions: &[&Description], field: &str, text: &str) -> Result<Port, Error> {
     Resolver { system, descriptions }.port(field, text)
 }
@@ -223,12 +223,12 @@ impl<'a> Resolver<'a> {
         Ok(Port { component, variable })
     }
 
-    /// The array that `text` names as a whole, if it does.
+    /// The array that `text` names as a whole, if any.
     fn array(&self, text: &str) -> Option<(usize, &'a Array)> {
         let (component, name) = text.split_once('.')?;
         let component = self.system.components().iter().position(|c| c.name == component)?;
         let description = self.descriptions[component];
-        // A scalar of the same name is meant before it.
+        // A scalar of the same name takes precedence.
         let array = description.array(name).filter(|_| description.index_of(name).is_none())?;
         Some((component, array))
     }
@@ -242,7 +242,7 @@ impl<'a> Resolver<'a> {
         Ok((elements.map(|variable| Port { component, variable }).collect(), Some(&array.sizes)))
     }
 
-    /// Why there is no scalar of this name.
+    /// The message if there is no scalar of this name.
     fn missing(&self, component: usize, name: &str) -> String {
         let (owner, description) = (&self.system.components()[component], self.descriptions[component]);
         if let Some(array) = description.array(name) {
@@ -256,7 +256,7 @@ impl<'a> Resolver<'a> {
             );
         }
         let unknown = format!("{} ({}) has no variable {name:?}", owner.name, owner.fmu);
-        // As the variables of the same FMU of FMI 2.0 are called.
+        // The variables of the same FMU in FMI 2.0 have names of this form.
         let base = name.split_once('.').and_then(|(base, _)| description.array(base));
         match base.and_then(|array| Some((array, description.variables.get(array.first)?))) {
             Some((array, first)) => {
@@ -267,7 +267,7 @@ impl<'a> Resolver<'a> {
         }
     }
 
-    /// A hint at variables whose name ends alike, or else nearly is the name given.
+    /// A hint at variables whose names end in the same way or are similar.
     fn similar(&self, component: usize, wanted: &str) -> String {
         let tail = wanted.rsplit('.').next().unwrap_or(wanted);
         let found: Vec<_> = self.descriptions[component]
@@ -297,7 +297,7 @@ impl<'a> Resolver<'a> {
 
     fn links(&self) -> Result<Vec<Link>, Error> {
         let mut links: Vec<Link> = Vec::new();
-        // The connection that each link is from.
+        // The connection that each link comes from.
         let mut owners = Vec::new();
         for (i, connection) in self.system.connections().iter().enumerate() {
             let field = format!("connection[{i}]");
@@ -337,9 +337,9 @@ impl<'a> Resolver<'a> {
         Ok(links)
     }
 
-    /// The link of an output to an input, both scalars, with the factor and offset of the file.
+    /// The link between two scalars, an output and an input, with the factor and offset of the file.
     fn link(&self, field: &str, [from, to]: [Port; 2], own: Option<f64>, offset: f64) -> Result<Link, Error> {
-        /// Digits that a factor in a file may leave out, in parts of 1.
+        /// Relative rounding error that a factor in a file may have.
         const ROUNDED: f64 = 1e-3;
         self.check_types(field, from, to)?;
         if self.family(to) != Family::Real && (own.is_some_and(|own| own != 1.0) || offset != 0.0) {
@@ -417,7 +417,7 @@ impl<'a> Resolver<'a> {
         Ok(())
     }
 
-    /// Arrays of equal name, an output and an input, must have equal sizes.
+    /// Refuses arrays of equal name, an output and an input, whose sizes differ.
     fn check_sizes(&self, field: &str, giver: usize, reader: usize) -> Result<(), Error> {
         let (given, taken) = (self.descriptions[giver], self.descriptions[reader]);
         for array in &given.arrays {
@@ -445,7 +445,7 @@ impl<'a> Resolver<'a> {
     fn check_types(&self, field: &str, from: Port, to: Port) -> Result<(), Error> {
         let (given, taken) = (self.variable(from), self.variable(to));
         let types = (given.type_name, taken.type_name);
-        // Both are whole numbers; a number that is no item of the enumeration ends the run.
+        // Both carry whole numbers. A number that is no item of the enumeration ends the run.
         let is_whole = |v: &Variable| matches!(v.family(), Family::Integer | Family::Enumeration);
         if given.family() != taken.family() && !(is_whole(given) && is_whole(taken)) {
             let (from, to, (given, taken)) = (self.name(from), self.name(to), types);
@@ -462,7 +462,7 @@ impl<'a> Resolver<'a> {
         Ok(())
     }
 
-    /// What is recorded, and notes on it.
+    /// The recorded signals, and notes on them.
     fn recorded(&self, links: &[Link]) -> Result<(Vec<Port>, Vec<String>), Error> {
         let Some(signals) = &self.system.record().signals else {
             let (mut ports, mut notes) = (Vec::new(), Vec::new());
@@ -492,8 +492,8 @@ impl<'a> Resolver<'a> {
         Ok((ports, Vec::new()))
     }
 
-    /// All outputs but [twins](Description::is_twin), then all connected inputs of a component. Of one without outputs that
-    /// are numbers its local variables, with a note.
+    /// All outputs of a component except [twins](Description::is_twin), then all connected inputs. A
+    /// component without numeric outputs contributes its local variables, with a note.
     fn default_columns(&self, component: usize, links: &[Link]) -> (Vec<Port>, Option<String>) {
         let ports = || {
             (0..self.descriptions[component].variables.len())
@@ -510,7 +510,7 @@ impl<'a> Resolver<'a> {
         (outputs.into_iter().chain(locals).chain(inputs).collect(), note)
     }
 
-    /// The local variables of a component, which has no outputs, and a note on that.
+    /// The local variables of a component without numeric outputs, and a note on them.
     fn locals(&self, component: usize) -> (Vec<Port>, Option<String>) {
         let description = self.descriptions[component];
         let is_moving = |v: &Variable| {
@@ -534,7 +534,7 @@ impl<'a> Resolver<'a> {
         (all.into_iter().take(MAX_LOCALS).collect(), Some(note))
     }
 
-    /// Notes on connections whose source nobody may read before the run begins, and for which there is no start value.
+    /// Notes on connections whose source must not be read before the run begins and has no start value.
     fn begins_with(&self, links: &[Link]) -> Vec<String> {
         let is_unknown = |v: &Variable| v.causality != Causality::Output && v.start.is_none();
         let unknown = links.iter().filter(|link| is_unknown(self.variable(link.from)));
@@ -619,7 +619,7 @@ impl<'a> Resolver<'a> {
     }
 }
 
-/// What a variable holds that is no number.
+/// What a variable that is not a number holds.
 fn unfit(variable: &Variable) -> &'static str {
     match variable.of {
         DataType::Binary => "a value of bytes",

@@ -1,5 +1,5 @@
-//! The values of a run: one vector of doubles, in which every output and every connected input has a slot. They
-//! come from and go to instances without allocation.
+//! The values of a run: one vector of doubles with a slot for every output and every connected input. Values
+//! are copied from and to instances without allocation.
 
 use std::ops::Range;
 
@@ -8,14 +8,14 @@ use punctual_fmu::instance::Place;
 use crate::error::Error;
 use crate::host::{Causality, DataType, Participant, Variable};
 
-/// Variables of one component that are read or written together, one type after another; their slots follow one
-/// another in this order. Real ones come first.
+/// The variables of one component that are read or written together, grouped by type with Real first. Their
+/// slots are consecutive in this order.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Group {
     first: usize,
     reals: usize,
     parts: Vec<Part>,
-    /// Where an instance in this process keeps them all, one for each slot.
+    /// If the instance runs in this process, its storage places, one for each slot.
     places: Option<Vec<Place>>,
 }
 
@@ -23,7 +23,7 @@ pub(super) struct Group {
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Part {
     of: DataType,
-    /// Of an array one for all elements.
+    /// The value references; an array has one for all elements.
     references: Vec<u32>,
     slots: usize,
 }
@@ -31,7 +31,7 @@ struct Part {
 /// A position in a component's variable list.
 pub(super) type Position = usize;
 
-/// The types that are numbers, in the order of slots.
+/// The numeric types, in the order of slots.
 const NUMBERS: [DataType; 12] = [
     DataType::Float64,
     DataType::Float32,
@@ -48,8 +48,8 @@ const NUMBERS: [DataType; 12] = [
 ];
 
 impl Group {
-    /// Lays out `variables` from slot `first` on. Of an array all elements must be there, in order. Returns the group
-    /// and the positions in slot order. What is no number is left out.
+    /// Lays out `variables` from slot `first` on. All elements of an array must be given, in order. Returns
+    /// the group and the positions in slot order. Variables that are not numbers are left out.
     pub(super) fn new(first: usize, variables: &[(Position, &Variable)]) -> (Self, Vec<Position>) {
         let mut group = Self { first, ..Self::default() };
         let mut positions = Vec::new();
@@ -75,18 +75,18 @@ impl Group {
         self.first..self.first + self.reals
     }
 
-    /// Asks the instance where it keeps the variables, which all have this causality.
+    /// Asks the instance for the storage places of the variables, which all have this causality.
     pub(super) fn place<P: Participant>(&mut self, instance: &P, causality: Causality) {
         let places = self.parts.iter().flat_map(|part| {
             part.references.iter().map(move |reference| instance.place(causality, part.of, *reference))
         });
         let places: Option<Vec<_>> = places.collect();
-        // An array has several slots by one reference.
+        // An array has several slots for one reference.
         let slots: usize = self.parts.iter().map(|part| part.slots).sum();
         self.places = places.filter(|places| places.len() == slots);
     }
 
-    /// Reads all variables of the group from the instance into their slots. Returns the real ones.
+    /// Reads all variables of the group from the instance into their slots. Returns the Real values.
     #[inline(always)]
     pub(super) fn read<'a, P: Participant>(
         &self,
@@ -135,17 +135,18 @@ pub(super) struct Source {
     input: usize,
     /// The slot of the output.
     output: usize,
-    /// Factor (units of the input per unit of the output) and offset (unit of the input); `None` in a plain connection.
+    /// Factor (units of the input per unit of the output) and offset (unit of the input); `None` for a plain
+    /// copy.
     scale: Option<[f64; 2]>,
 }
 
 impl Source {
-    /// From `output` to `input`, which are slots, by a factor and an offset.
+    /// Connects slot `output` to slot `input` with a factor and an offset.
     pub(super) fn new(input: usize, output: usize, factor: f64, offset: f64) -> Self {
         Self { input, output, scale: (factor != 1.0 || offset != 0.0).then_some([factor, offset]) }
     }
 
-    /// Takes the value over. A plain connection copies the bits, the sign of zero included.
+    /// Copies the value. A plain copy preserves all bits, including the sign of zero.
     pub(super) fn transfer(&self, values: &mut [f64]) {
         let value = values[self.output];
         values[self.input] = match self.scale {

@@ -1,9 +1,9 @@
-//! Verdicts on the promises of filters in the course of a run, recorded or not. A filter is known by the names of
-//! its outputs: `status`, and `<barrier>.h` with the others of [`FIELDS`].
+//! Judges the promises of filters during a run, whether or not they are recorded. A filter is recognised by
+//! the names of its outputs: `status`, and `<barrier>.h` with the others of [`FIELDS`].
 //!
-//! A promise is judged by h itself ([`punctual_core::judge`]), at the deadline and at the communication points.
-//! Where a filter's outputs are read a step late (Jacobi order, no direct feedthrough), h is that of the point
-//! before.
+//! A promise is judged by h itself ([`punctual_core::judge`]), at the deadline and at the communication
+//! points. If a filter's outputs are read a step late (Jacobi order, no direct feedthrough), h belongs to the
+//! point before.
 
 use punctual_core::filter::{AssuranceStatus, Phase, Status};
 use punctual_core::judge::{Interpolation, Judge, Judgement, PromiseState, Verdict};
@@ -19,7 +19,7 @@ use crate::host::{Causality, Description, Family};
 /// The outputs of a barrier that are read.
 const FIELDS: [&str; 5] = ["unmet_steps", "slack", "h", "deadline_unreachable", "phase"];
 
-/// Those of a filter that follows plans: that of the whole filter, and that of the barrier.
+/// The outputs of a filter that follows backup plans: one for the whole filter, one for each barrier.
 const PLANS: &str = "assurance";
 const GUARANTEED: &str = "guaranteed";
 
@@ -27,18 +27,18 @@ const GUARANTEED: &str = "guaranteed";
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kept {
-    /// On time, and inside from then on; from the start on where it began inside.
+    /// On time, and inside from then on. If it began inside: inside from the start on.
     Kept,
     /// Late, or left.
     Broken,
-    /// The run ends before the verdict.
+    /// The run ended before a verdict.
     Open,
     /// It began outside and has no deadline.
     NothingPromised,
 }
 
 impl Kept {
-    /// The verdict in words.
+    /// The verdict as text.
     pub fn words(self) -> &'static str {
         match self {
             Self::Kept => "kept",
@@ -49,7 +49,7 @@ impl Kept {
     }
 }
 
-/// What became of all `promises`, in a sentence; `None` where there are none.
+/// The overall verdict on `promises` as a sentence; `None` if there are none.
 pub fn verdict(promises: &[Promise]) -> Option<(Kept, String)> {
     let count = |verdict| promises.iter().filter(|p| p.promise == verdict).count();
     let (broken, kept) = (count(Kept::Broken), count(Kept::Kept));
@@ -73,7 +73,7 @@ impl From<Verdict> for Kept {
     }
 }
 
-/// Findings on one barrier: its promise, which is about h, and its constraint, which is about steps.
+/// Findings on one barrier. Its promise is about h; its constraint is about single steps.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Promise {
     /// `component.barrier`.
@@ -86,39 +86,41 @@ pub struct Promise {
     pub deadline: Option<f64>,
     /// Whether it began inside.
     pub began_inside: bool,
-    /// Whether h ≥ 0 held by the deadline; without one, at the start.
+    /// Whether h ≥ 0 held by the deadline; without a deadline, at the start.
     pub on_time: bool,
-    /// Whether h ≥ 0 held from the deadline on; from the start on where it began inside.
+    /// Whether h ≥ 0 held from the deadline on, or from the start on if it began inside.
     pub inside: bool,
-    /// First time in s with h ≥ 0, between two samples where it lies there.
+    /// First time in s with h ≥ 0, interpolated between two samples if it lies there.
     pub arrival: Option<f64>,
-    /// Time in s at which it became certain that the deadline is missed.
+    /// Time in s at which it became certain that the deadline would be missed.
     pub late: Option<f64>,
-    /// By how many seconds it arrived later than its deadline; infinite (`null` in JSON) where it was late and never arrived.
+    /// By how many seconds it arrived after its deadline; infinite (`null` in JSON) if it was late and never
+    /// arrived.
     pub late_by: Option<f64>,
-    /// Time in s at which it was left, after it had been inside and was to stay so.
+    /// Time in s at which it was left after it had been inside and had to stay there.
     pub left: Option<f64>,
-    /// Least h while it was to be inside.
+    /// Least h during the time in which it had to be inside.
     pub least_h: Option<f64>,
-    /// Whether the filter found no plan at the start, and so promised nothing.
+    /// Whether the filter found no plan at the start and so gave no guarantee.
     pub refused: bool,
-    /// Whether a plan was behind it at every sample; `None` where the filter follows none.
+    /// Whether a plan guaranteed it at every sample; `None` if the filter follows no plans.
     pub guaranteed: Option<bool>,
-    /// Samples that did not meet its constraint, or had no valid input to meet it with.
+    /// Samples that did not meet the constraint, or had no valid input.
     pub unmet: u64,
-    /// The greatest number of such samples in a row.
+    /// The longest run of such samples.
     pub longest: u64,
-    /// The largest violation of its constraint at one of them, in the unit of its slack; 0 without one.
+    /// The largest violation of the constraint over these samples, in the unit of its slack; 0 if there are
+    /// none.
     pub violation: f64,
 }
 
 impl Promise {
-    /// Whether nothing was missed: the promise is kept and every sample met the constraint.
+    /// Whether the promise is kept and every sample met the constraint.
     pub fn kept(&self) -> bool {
         self.promise == Kept::Kept && self.constraint_met
     }
 
-    /// Takes over the judgement on h.
+    /// Takes over a judgement on h.
     fn judged(&mut self, seen: &Judgement) {
         self.promise = seen.verdict().into();
         (self.deadline, self.began_inside) = (seen.deadline, seen.began_inside);
@@ -129,29 +131,29 @@ impl Promise {
     }
 }
 
-/// The outputs that tell of a promise, and the facts known before a run.
+/// The outputs that a promise is judged by, and the facts known before a run.
 pub(super) struct Ports {
     /// `component.barrier`.
     name: String,
     pub(super) status: Port,
     pub(super) fields: [Port; FIELDS.len()],
-    /// [`PLANS`] and [`GUARANTEED`], where the filter follows plans.
+    /// [`PLANS`] and [`GUARANTEED`], if the filter follows plans.
     pub(super) plans: Option<[Port; 2]>,
     rearm: Option<Port>,
-    /// The value reference of its deadline, and the value where none is set.
+    /// The value reference of its deadline, and its start value in the description.
     deadline: Option<(u32, f64)>,
     interpolation: Interpolation,
     /// Whether h belongs to the communication point at which it is read.
     prompt: bool,
-    /// The measured states that are connected; of the first barrier only.
+    /// The connected measured states; listed for the first barrier only.
     states: Vec<Port>,
 }
 
-/// A promise that is watched.
+/// A promise under observation.
 #[derive(Debug)]
 pub(super) struct Watched {
     pub(super) component: usize,
-    /// The value reference of its deadline, and the value where none is set.
+    /// The value reference of its deadline, and its start value in the description.
     pub(super) deadline: Option<(u32, f64)>,
     name: String,
     interpolation: Interpolation,
@@ -161,7 +163,7 @@ pub(super) struct Watched {
     fields: [usize; FIELDS.len()],
     plans: Option<[usize; 2]>,
     states: Vec<usize>,
-    /// The state that changes in the course of a run.
+    /// The part of the state that changes during a run.
     run: Run,
 }
 
@@ -169,7 +171,7 @@ pub(super) struct Watched {
 struct Run {
     judge: Judge,
     deadline: Option<f64>,
-    /// The judgement before the last re-arming; a broken one stays.
+    /// The judgement before the last re-arming. A broken promise stays broken.
     before: Option<Judgement>,
     rearm: bool,
     started: bool,
@@ -183,25 +185,28 @@ struct Run {
     zeros: Zeros,
 }
 
-/// The measured state of a filter while it is all zero from the start on, and the two points after it.
+/// Detects a plant that outputs zeros before its first step: follows the measured state of a filter while all
+/// of it is zero from the start on, and for two points after that.
 #[derive(Clone, Debug, Default)]
 struct Zeros {
     /// The first point, and the last one with zeros.
     first: Option<f64>,
     last: Option<f64>,
-    /// Whether deadlines count from one of them.
+    /// Whether deadlines count from one of these points.
     counted: bool,
-    /// The first point with another state, and that; how far it moved until the next point.
+    /// The first point with a nonzero state, and that state; then how far it moved up to the next point.
     after: Option<(f64, Vec<f64>)>,
     moved: Option<f64>,
 }
 
 impl Zeros {
-    /// How much farther the state goes at once, from zeros, than in the next step, where the zeros were none of the plant.
+    /// The zeros did not come from the plant if the state jumps from them this many times as far as it moves
+    /// in the next step.
     const JUMP: f64 = 10.0;
 
-    /// Takes the state `x` at `time` (s), until it is known how far that moved. `is_valid` says whether the sample there, or
-    /// where outputs come late that of the point before, is one that deadlines count from.
+    /// Takes the state `x` at `time` (s), until its movement after the zeros is known. `is_valid` says
+    /// whether deadlines can count from the sample; if outputs are read late, this is the sample of the point
+    /// before.
     fn see(&mut self, time: f64, x: impl Iterator<Item = f64> + Clone, is_valid: bool, prompt: bool) {
         self.first.get_or_insert(time);
         match &self.after {
@@ -220,12 +225,12 @@ impl Zeros {
         }
     }
 
-    /// What to say of the filter `name`, if its deadlines count from zeros that were none of its plant.
+    /// A note on the filter `name` if its deadlines count from zeros that did not come from its plant.
     fn note(&self, name: &str) -> Option<String> {
         let (first, last, moved) = (self.first?, self.last?, self.moved?);
         let (time, x) = self.after.as_ref()?;
         let far = x.iter().fold(0.0, |far: f64, x| far.max(x.abs()));
-        // NaN is no jump.
+        // NaN does not count as a jump.
         let jumps = self.counted && far > Self::JUMP * moved;
         jumps.then(|| {
             format!(
@@ -310,19 +315,19 @@ const STATE: &str = "x";
 /// The wanted inputs of a filter.
 const WANTED: &str = "u_ref";
 
-/// Whether a variable is one of those called `all`: as `x.v`, or as an element of an array, `x[2]`.
+/// Whether a variable belongs to the group `all`, as `x.v` or as an array element `x[2]`.
 fn is_of(name: &str, all: &str) -> bool {
     name.strip_prefix(all).is_some_and(|rest| rest.starts_with(['.', '[']))
 }
 
 /// The Real inputs of `component` that have neither a connection nor a start value in the system file.
-fn loose<'a>(
+fn unfed<'a>(
     system: &System,
     component: usize,
     description: &'a Description,
     links: &[Link],
 ) -> Vec<(Port, &'a str)> {
-    // A start value may be that of a whole array.
+    // A start value may be given for a whole array.
     let starts = &system.components()[component].start;
     let given = |variable: usize, name: &str| {
         let arrays = starts.keys().filter_map(|key| description.array(key));
@@ -333,31 +338,31 @@ fn loose<'a>(
     let all = description.variables.iter().enumerate();
     let all = all.filter(|(_, v)| v.causality == Causality::Input && v.family() == Family::Real);
     let ports = all.map(|(variable, v)| (Port { component, variable }, v.name.as_str()));
-    let loose = |port: &Port| links.iter().all(|link| link.to != *port);
-    ports.filter(|(port, name)| loose(port) && !given(port.variable, name)).collect()
+    let unfed = |port: &Port| links.iter().all(|link| link.to != *port);
+    ports.filter(|(port, name)| unfed(port) && !given(port.variable, name)).collect()
 }
 
-/// Refuses Real inputs that nothing feeds: they would stay at the FMU's start value without a word. The wanted
-/// inputs of a filter may, and inputs in `given`, which have their values from elsewhere.
+/// Refuses Real inputs that nothing feeds, which would silently stay at the FMU's start value. The wanted
+/// inputs of a filter may be unfed, and so may inputs in `given`, whose values come from elsewhere.
 ///
 /// # Errors
 ///
-/// Such inputs, by the component.
+/// Unfed inputs, listed by component.
 pub fn check_fed(
     system: &System,
     descriptions: &[&Description],
     links: &[Link],
     given: &[Port],
 ) -> Result<(), Error> {
-    /// Most names in a message.
+    /// The most names in a message.
     const NAMES: usize = 8;
     for (component, description) in descriptions.iter().enumerate() {
-        let mut loose = loose(system, component, description, links);
+        let mut unfed = unfed(system, component, description, links);
         let filter = is_filter(description);
-        loose.retain(|(port, name)| !(given.contains(port) || filter && is_of(name, WANTED)));
-        let Some((_, first)) = loose.first() else { continue };
-        let names: Vec<_> = loose.iter().take(NAMES).map(|(_, name)| *name).collect();
-        let more = match loose.len() - names.len() {
+        unfed.retain(|(port, name)| !(given.contains(port) || filter && is_of(name, WANTED)));
+        let Some((_, first)) = unfed.first() else { continue };
+        let names: Vec<_> = unfed.iter().take(NAMES).map(|(_, name)| *name).collect();
+        let more = match unfed.len() - names.len() {
             0 => String::new(),
             more => format!(" and {more} more"),
         };
@@ -372,22 +377,22 @@ pub fn check_fed(
     Ok(())
 }
 
-/// Notes on filters none of whose wanted inputs is fed. One with a start value in the system file is meant to be
-/// constant.
+/// Notes on filters none of whose wanted inputs is fed. An input with a start value in the system file is
+/// meant to be constant.
 pub(super) fn unwanted(system: &System, descriptions: &[&Description], links: &[Link]) -> Vec<String> {
     let mut notes = Vec::new();
     for (component, description) in descriptions.iter().enumerate().filter(|(_, d)| is_filter(d)) {
         let wanted = |name: &str| is_of(name, WANTED);
         let inputs = description.variables.iter().filter(|v| v.causality == Causality::Input);
         let count = inputs.filter(|v| wanted(&v.name)).count();
-        let loose = loose(system, component, description, links);
-        let loose: Vec<_> = loose.into_iter().map(|(_, name)| name).filter(|name| wanted(name)).collect();
-        if !loose.is_empty() && loose.len() == count {
+        let unfed = unfed(system, component, description, links);
+        let unfed: Vec<_> = unfed.into_iter().map(|(_, name)| name).filter(|name| wanted(name)).collect();
+        if !unfed.is_empty() && unfed.len() == count {
             notes.push(format!(
                 "{}: nothing feeds {}: the wanted input is 0 at all times, and nothing damps the motion along the set; \
                  connect a controller, such as damping, or give a start value",
                 system.components()[component].name,
-                loose.join(", ")
+                unfed.join(", ")
             ));
         }
     }
@@ -395,7 +400,7 @@ pub(super) fn unwanted(system: &System, descriptions: &[&Description], links: &[
 }
 
 impl Watched {
-    /// `None` where a port has no slot.
+    /// `None` if a port has no slot.
     pub(super) fn new(layout: &Layout, ports: &Ports) -> Option<Self> {
         let mut slots = [0; FIELDS.len()];
         for (slot, port) in slots.iter_mut().zip(&ports.fields) {
@@ -419,8 +424,8 @@ impl Watched {
         })
     }
 
-    /// Forgets the run before; `deadline` in s after the first step is that of the next. Returns a note on a
-    /// deadline that comes before the end of the first `step` (s).
+    /// Forgets the last run. `deadline` is that of the next run, in s after its first step. Returns a note if
+    /// the deadline comes before the end of the first `step` (s).
     pub(super) fn reset(&mut self, deadline: Option<f64>, step: f64) -> Option<String> {
         self.run = Run::new(deadline, self.interpolation);
         let deadline = deadline.filter(|deadline| *deadline < step)?;
@@ -430,7 +435,7 @@ impl Watched {
         ))
     }
 
-    /// Takes the `values` of the communication point at `time` (s).
+    /// Evaluates the `values` of the communication point at `time` (s).
     pub(super) fn see(&mut self, time: f64, values: &[f64]) {
         let at = if self.prompt { Some(time) } else { self.run.last };
         let [unmet, slack, h, lost, phase] = self.fields.map(|slot| values[slot]);
@@ -458,9 +463,9 @@ impl Watched {
         if run.started {
             if let Some([plans, guaranteed]) = self.plans.map(|slots| slots.map(|slot| values[slot])) {
                 run.refused |= plans == f64::from(AssuranceStatus::Refused as u8);
-                // A barrier that is let go is behind its promise.
-                let stands = guaranteed != 0.0 || is(Phase::Released);
-                run.guaranteed = Some(run.guaranteed != Some(false) && stands);
+                // A released barrier no longer needs a guarantee.
+                let is_covered = guaranteed != 0.0 || is(Phase::Released);
+                run.guaranteed = Some(run.guaranteed != Some(false) && is_covered);
             }
             let promise_state = match () {
                 () if is(Phase::Released) => PromiseState::Released,
@@ -479,13 +484,13 @@ impl Watched {
         }
     }
 
-    /// What the user should know of the state that the filter was given, if there is anything.
+    /// A note for the user on the state that the filter received, if necessary.
     pub(super) fn note(&self) -> Option<String> {
         let filter = self.name.rsplit_once('.').map_or(self.name.as_str(), |(filter, _)| filter);
         self.run.zeros.note(filter)
     }
 
-    /// The promise until now.
+    /// The findings so far.
     pub(super) fn promise(&self) -> Promise {
         let run = &self.run;
         let mut promise = Promise {
@@ -507,7 +512,7 @@ impl Watched {
             longest: run.longest,
             violation: run.violation,
         };
-        // A promise that was broken before its new start stays broken.
+        // A promise that was broken before a re-arming stays broken.
         let before = run.before.filter(|before| before.verdict() == Verdict::Broken);
         promise.judged(&before.unwrap_or_else(|| run.judge.judgement()));
         promise

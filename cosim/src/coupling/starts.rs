@@ -1,4 +1,4 @@
-//! Start values of a system file, resolved against the description of the component's FMU.
+//! Resolves the start values of a system file against the description of the component's FMU.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use super::system::{Component, StartValue};
 use crate::error::Error;
 use crate::host::{Causality, DataType, Description, Family, Variable, whole_range};
 
-/// A resolved start value: all that is written by one call.
+/// A resolved start value, written by one call.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Start {
     pub(super) of: DataType,
@@ -18,7 +18,7 @@ pub(super) struct Start {
     pub(super) values: Values,
 }
 
-/// The values of a variable; of an array one for each element.
+/// The values of a variable, one for each element of an array.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Values {
     Numbers(Vec<f64>),
@@ -31,7 +31,7 @@ impl Start {
         Self { of: DataType::Float64, reference, structural: false, values: Values::Numbers(vec![value]) }
     }
 
-    /// Its number, if it is that of the real scalar with this reference.
+    /// Its number, if it belongs to the Real scalar with this reference.
     pub(super) fn number(&self, reference: u32) -> Option<f64> {
         match &self.values {
             Values::Numbers(values) if self.of == DataType::Float64 && self.reference == reference => {
@@ -42,7 +42,7 @@ impl Start {
     }
 }
 
-/// The start values of the component at `position`. `missing` says why there is no variable of a name.
+/// The start values of the component at `position`. `missing` gives the message for an unknown name.
 pub(super) fn resolve(
     position: usize,
     component: &Component,
@@ -50,7 +50,7 @@ pub(super) fn resolve(
     missing: impl Fn(&str) -> String,
 ) -> Result<Vec<Start>, Error> {
     let mut starts: Vec<Start> = Vec::new();
-    // A whole array comes before its elements.
+    // A whole array comes before its elements, which override it.
     for (name, value) in &component.start {
         let wrong = |message: String| {
             Error::from(ConfigurationError::new(format!("component[{position}].start.{name:?}"), message))
@@ -86,8 +86,8 @@ pub(super) fn resolve(
     Ok(starts)
 }
 
-/// The values that a component gives to structural parameters, by value reference. What cannot be one is left out;
-/// [`resolve`] tells why.
+/// The values that a component sets for structural parameters, by value reference. Unusable values are left
+/// out; [`resolve`] reports them.
 pub(super) fn structural(component: &Component, description: &Description) -> BTreeMap<u32, f64> {
     let given = component.start.iter().filter_map(|(name, value)| {
         let variable = &description.variables[description.index_of(name)?];
@@ -97,7 +97,7 @@ pub(super) fn structural(component: &Component, description: &Description) -> BT
     given.collect()
 }
 
-/// What to say of angles of more than a turn among the start values.
+/// Notes on angles of more than one turn among the start values.
 pub(super) fn in_degrees(components: &[Component], descriptions: &[&Description]) -> Vec<String> {
     let mut notes = Vec::new();
     for (component, description) in components.iter().zip(descriptions) {
@@ -125,7 +125,7 @@ fn check_causality(variable: &Variable) -> Result<(), String> {
     Err(format!("has causality {causality}; only parameters and inputs can be given a start value"))
 }
 
-/// Puts a value into the start of its variable, which begins with what the description says.
+/// Writes a value into the start values of its variable, which are initially those of the description.
 fn place(
     starts: &mut Vec<Start>,
     description: &Description,
@@ -160,7 +160,7 @@ fn place(
     Ok(())
 }
 
-/// The value as a number that the variable can have.
+/// Converts the value to a number that the variable accepts.
 fn number(variable: &Variable, value: &StartValue) -> Result<f64, String> {
     let number = match (variable.family(), value) {
         (Family::Real, StartValue::Real(x)) => *x,

@@ -1,5 +1,5 @@
-//! The system file: TOML text to a checked [`System`]. All that can be checked without opening an FMU is checked
-//! here; the rest in `network`.
+//! The system file: parses TOML text into a checked [`System`]. Everything that can be checked without
+//! opening an FMU is checked here; the rest is checked in `network`.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -12,8 +12,8 @@ use serde::de::{Deserializer, Error as _, IgnoredAny, MapAccess, SeqAccess, Visi
 use crate::error::Error;
 use crate::text;
 
-/// A coupled system, read from a system file. Made only by [`System::parse`] and [`System::read`],
-/// so its numbers are in range and its component names are unique.
+/// A coupled system, read from a system file. Only [`System::parse`] and [`System::read`] make it, so its
+/// numbers are in range and its component names are unique.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct System {
@@ -43,7 +43,7 @@ pub struct Experiment {
     /// Order of calls within a communication step; default Gauss–Seidel.
     #[serde(default)]
     pub order: Order,
-    /// Relative tolerance for the solvers inside FMUs, finite, > 0; default none, so that each takes its own.
+    /// Relative tolerance for the solvers inside FMUs, finite, > 0; by default each uses its own.
     pub tolerance: Option<f64>,
 }
 
@@ -54,8 +54,8 @@ pub enum Order {
     /// Components with direct feedthrough first, in the order of the signals: no delay.
     #[default]
     GaussSeidel,
-    /// All components at once on the values of the last communication point: feedthrough outputs
-    /// act one step late.
+    /// All components at once, with the values of the last communication point. Feedthrough outputs act one
+    /// step late.
     Jacobi,
 }
 
@@ -67,8 +67,8 @@ pub struct Component {
     pub name: String,
     /// Its FMU, relative to the folder of the system file.
     pub fmu: String,
-    /// Whether outputs whose dependencies the FMU does not declare depend on its inputs at the same instant.
-    /// Default true, as the standard says; false suits a plant, whose outputs change in steps only.
+    /// Whether outputs with undeclared dependencies depend on the inputs at the same instant. Default true,
+    /// as the standard says. False suits a plant whose outputs change only at steps.
     #[serde(default = "yes")]
     pub feedthrough: bool,
     /// Relative tolerance for the solver inside this FMU, finite, > 0; default that of the experiment.
@@ -93,12 +93,12 @@ pub enum StartValue {
     Boolean(bool),
     /// For a String variable.
     Text(String),
-    /// For an array, whose elements may be lists again.
+    /// For an array; elements can be lists themselves.
     List(Vec<StartValue>),
 }
 
 impl StartValue {
-    /// The value as a number; of other values none.
+    /// The value as a number, if it is one.
     pub fn number(&self) -> Option<f64> {
         match *self {
             Self::Real(value) => Some(value),
@@ -107,7 +107,7 @@ impl StartValue {
         }
     }
 
-    /// The sizes of the list, the outermost first; of a plain value none. `None` where it is ragged.
+    /// The sizes of the list, the outermost first; empty for a plain value. `None` if it is ragged.
     pub fn sizes(&self) -> Option<Vec<usize>> {
         let Self::List(values) = self else { return Some(Vec::new()) };
         let mut inner = values.iter().map(Self::sizes);
@@ -162,8 +162,8 @@ impl<'de> Deserialize<'de> for StartValue {
     }
 }
 
-/// One signal from an output to an input: `to = factor · from + offset`. Without a factor of its own the units make it, where
-/// they differ.
+/// One signal from an output to an input: `to = factor · from + offset`. Without a factor of its own, it
+/// converts between the units if they differ.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Connection {
@@ -171,15 +171,16 @@ pub struct Connection {
     pub from: String,
     /// `component.variable` of an input.
     pub to: String,
-    /// Factor, finite, in units of the input per unit of the output; default: what the units make it. Real signals only.
+    /// Factor, finite, in units of the input per unit of the output; by default it converts the units. Real
+    /// signals only.
     pub factor: Option<f64>,
     /// Offset, finite, in the unit of the input; default 0. Real signals only.
     #[serde(default)]
     pub offset: f64,
 }
 
-/// Connects every output of one component to the input of equal name of the other, both ways.
-/// An explicit [`Connection`] to the same input wins.
+/// Connects every output of either component to the other's input of the same name. An explicit
+/// [`Connection`] to the same input takes precedence.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ByName {
@@ -231,7 +232,7 @@ enum PictureKind {
     Time,
 }
 
-/// The keys of both kinds, as far as they are given.
+/// The keys of both kinds, all optional.
 #[derive(Default)]
 struct RawPicture {
     kind: Option<PictureKind>,
@@ -251,7 +252,7 @@ struct RawPicture {
     scale: Variant,
 }
 
-/// Reads a [`Picture`] key by key. A tagged enum would lose the key of a value that is refused.
+/// Reads a [`Picture`] key by key. A tagged enum would lose the key of a refused value.
 struct PictureVisitor;
 
 impl<'de> Visitor<'de> for PictureVisitor {
@@ -341,7 +342,7 @@ pub struct PathPicture {
     pub y: String,
     /// The legend entry of this path; default the component's name.
     pub label: Option<String>,
-    /// A signal; the path is marked where it is first true (not 0).
+    /// A signal; the path is marked where it first becomes true (not 0).
     pub arrival: Option<String>,
     /// Further paths.
     pub more: Vec<PathEntry>,
@@ -359,7 +360,7 @@ pub struct PathEntry {
     pub y: String,
     /// The legend entry; default the component's name.
     pub label: Option<String>,
-    /// A signal; the path is marked where it is first true (not 0).
+    /// A signal; the path is marked where it first becomes true (not 0).
     pub arrival: Option<String>,
 }
 
@@ -373,7 +374,7 @@ pub struct DiscEntry {
     pub radius: f64,
     /// Its legend entry; default none.
     pub label: Option<String>,
-    /// Whether it is to be kept out of; default false.
+    /// Whether it must be avoided; default false.
     #[serde(default)]
     pub obstacle: bool,
 }
@@ -389,7 +390,7 @@ pub struct TimePicture {
     pub signals: Vec<String>,
     /// Signals drawn as dashed lines.
     pub dashed: Vec<String>,
-    /// The label of the y axis; default the unit, where all signals share one.
+    /// The label of the y axis; default the unit, if all signals share one.
     pub ylabel: Option<String>,
     /// A vertical line at this time in seconds, finite.
     pub deadline: Option<f64>,
@@ -406,7 +407,7 @@ pub enum Variant {
     /// All values, linear.
     #[default]
     Linear,
-    /// Linear, without the rare extremes; the picture tells what is cut off.
+    /// Linear, without rare extremes; the picture says what is cut off.
     Clipped,
     /// Logarithm of the absolute values.
     Log,
@@ -421,8 +422,8 @@ impl System {
     ///
     /// # Errors
     ///
-    /// Text that is not TOML, unknown or missing keys, values of the wrong type or out of range,
-    /// component names that are empty, have a dot or are used twice: each with the field.
+    /// Text that is not TOML; unknown or missing keys; values of the wrong type or out of range; component
+    /// names that are empty, contain a dot or are used twice. Each error names the field.
     pub fn parse(text: &str) -> Result<Self, Error> {
         let system: Self = read_toml(text).map_err(|e| FileKind::System.instead(text).unwrap_or(e))?;
         system.check()?;
@@ -438,11 +439,11 @@ impl System {
         Self::parse(&text::read(path)?).map_err(|e| e.in_file(path))
     }
 
-    /// The same system, run to `stop_time` in steps of `step` (s), where these are given.
+    /// The same system, run until `stop_time` in steps of `step` (s), if given.
     ///
     /// # Errors
     ///
-    /// Times that cannot be, as in a system file.
+    /// Times that a system file may not have either.
     pub fn timed(mut self, stop_time: Option<f64>, step: Option<f64>) -> Result<Self, ConfigurationError> {
         self.experiment.stop_time = stop_time.unwrap_or(self.experiment.stop_time);
         self.experiment.step = step.unwrap_or(self.experiment.step);

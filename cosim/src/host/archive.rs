@@ -1,6 +1,6 @@
-//! An `.fmu` file unpacked into a directory of its own, which is removed with the value. The file may come from
-//! anyone. So names and sizes are checked before a byte is written, and the bytes written are counted. Knows the
-//! layout of the archive, not the content of its files.
+//! An `.fmu` file unpacked into a directory of its own, which is removed together with the value. The file
+//! may come from anyone, so names and sizes are checked before a byte is written, and the bytes written are
+//! counted. This module knows the layout of the archive, not the content of its files.
 
 use std::collections::HashSet;
 use std::fs::File;
@@ -21,7 +21,7 @@ pub const MAX_FILE_BYTES: u64 = 2 << 30;
 pub const MAX_ENTRIES: u64 = 20_000;
 /// The greatest length of an entry's name, in bytes.
 pub const MAX_NAME_BYTES: usize = 1024;
-/// The greatest size of an archive unpacked, in bytes.
+/// The greatest unpacked size of an archive, in bytes.
 pub const MAX_UNPACKED_BYTES: u64 = 4 << 30;
 /// The greatest ratio of the unpacked size to the file's, dimensionless, for archives that unpack to
 /// more than [`SMALL_BYTES`]. Deflate reaches 1032; libraries and tables stay below 50.
@@ -33,7 +33,7 @@ pub const MAX_DESCRIPTION_BYTES: u64 = 64 << 20;
 
 const MODEL_DESCRIPTION: &str = "modelDescription.xml";
 
-/// Bytes that a path in a `file:` URI must not carry as they are (RFC 3986, `pchar` and `/` may stay).
+/// Bytes that must be percent-encoded in the path of a `file:` URI (RFC 3986 allows `pchar` and `/`).
 const URI_PATH: &AsciiSet = &CONTROLS
     .add(b' ')
     .add(b'"')
@@ -65,12 +65,13 @@ impl Archive {
     ///
     /// # Errors
     ///
-    /// The file cannot be read, is not a zip archive, or exceeds one of the limits above. An entry points out of
-    /// the archive (an absolute name, a drive, a backslash, a `..`), is there twice, is neither a file nor a
-    /// folder, or is neither stored nor deflated. Nothing is written before all of this is known.
+    /// The file cannot be read, is not a zip archive, or exceeds one of the limits above. An entry points out
+    /// of the archive (an absolute name, a drive, a backslash, a `..`), occurs twice, is neither a file nor a
+    /// folder, or is neither stored nor deflated. All of this is checked before anything is written.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let problem = |problem| Error::fmu(path, problem);
-        // Asked first, to tell "no such file" and a folder, which Windows does not open, from "not an archive".
+        // Checked first, to distinguish a missing file and a folder, which Windows does not open, from a file
+        // that is no archive.
         let metadata = std::fs::metadata(path).map_err(|e| Error::io("read", path, e))?;
         if !metadata.is_file() {
             return Err(problem(FmuProblem::Archive("it is not a file".into())));
@@ -106,7 +107,7 @@ impl Archive {
         Ok(Self { source: path.to_owned(), directory, entries, platforms })
     }
 
-    /// The file this was unpacked from.
+    /// The `.fmu` file.
     pub fn source(&self) -> &Path {
         &self.source
     }
@@ -147,13 +148,12 @@ impl Archive {
         self.xml(MODEL_DESCRIPTION)
     }
 
-    /// The text of an entry with XML, as far as it is safe to parse. A byte order mark stays; ISO-8859-1 is read where
-    /// the text says so.
+    /// The text of an XML entry, if it is safe to parse. A byte order mark is kept; ISO-8859-1 is decoded if
+    /// the text declares it.
     ///
     /// # Errors
     ///
-    /// It is missing, too large, not UTF-8, or more deeply nested or wider than
-    /// `bounds.rs` allows.
+    /// It is missing, too large, not UTF-8, or nested more deeply or wider than `bounds.rs` allows.
     pub fn xml(&self, entry: &str) -> Result<String, FmuProblem> {
         let missing = |e: io::Error| FmuProblem::Description(format!("cannot be read: {e}"));
         let path = self.path(entry);
@@ -163,7 +163,7 @@ impl Archive {
         let bytes = std::fs::read(&path).map_err(missing)?;
         let is_latin = declared_encoding(&bytes).is_some_and(is_latin);
         let text = if is_latin {
-            // Its bytes are the first 256 characters.
+            // ISO-8859-1 bytes are the first 256 characters.
             bytes.into_iter().map(char::from).collect()
         } else {
             String::from_utf8(bytes).map_err(|e| {
@@ -198,12 +198,12 @@ impl Archive {
     }
 }
 
-/// Whether an encoding is ISO-8859-1, which the standard excludes, but tools write.
+/// Whether an encoding is ISO-8859-1, which the standard excludes but some tools write.
 pub fn is_latin(encoding: &str) -> bool {
     ["iso-8859-1", "iso8859-1", "latin1"].iter().any(|name| encoding.eq_ignore_ascii_case(name))
 }
 
-/// The encoding that the XML declaration at the beginning of `bytes` names, if there is one.
+/// The encoding named by the XML declaration at the beginning of `bytes`, if any.
 pub fn declared_encoding(bytes: &[u8]) -> Option<&str> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).strip_prefix(b"<?xml")?;
     let end = bytes.windows(2).position(|two| two == b"?>")?;
@@ -211,7 +211,7 @@ pub fn declared_encoding(bytes: &[u8]) -> Option<&str> {
     rest.split(['"', '\'']).nth(1)
 }
 
-/// An entry that may be unpacked.
+/// An entry to unpack.
 struct Entry {
     index: usize,
     name: String,
@@ -223,12 +223,13 @@ fn limit(what: &'static str, value: u64, unit: &'static str, allowed: u64) -> Re
     if value <= allowed { Ok(()) } else { Err(FmuProblem::Limit { what, value, unit, allowed }) }
 }
 
-/// Refuses a file whose end announces too many entries, before memory is taken for them. (The plain form counts
-/// in 16 bits; a larger count is in a separate record.)
+/// Refuses a file whose end record announces too many entries, before memory is allocated for them. (The
+/// plain record counts in 16 bits; a larger count is in a separate record.)
 fn announced_entries(file: &mut File) -> Result<(), FmuProblem> {
     let io = |e: io::Error| FmuProblem::Archive(e.to_string());
     let length = file.seek(SeekFrom::End(0)).map_err(io)?;
-    // The last record is 22 bytes and a comment of at most 65535; the large records come before it.
+    // The last record has 22 bytes and a comment of at most 65535; the records for large archives come before
+    // it.
     let tail = length.min(22 + 65_535 + 20 + 56);
     file.seek(SeekFrom::Start(length - tail)).map_err(io)?;
     let mut bytes = Vec::new();
@@ -284,7 +285,7 @@ fn survey(zip: &mut ZipArchive<BufReader<File>>, file_size: u64) -> Result<Vec<E
         if !matches!(method, CompressionMethod::Stored | CompressionMethod::Deflated) {
             return Err(FmuProblem::Compression { entry: name, method: compression(method) });
         }
-        // Two names that differ in case only would overwrite each other where case does not count.
+        // Two names that differ only in case would overwrite each other on a system that ignores case.
         if !names.insert(name.to_lowercase()) {
             let text = format!("the entry {name:?} is there twice (upper and lower case apart)");
             return Err(FmuProblem::Archive(text));
@@ -305,7 +306,7 @@ fn survey(zip: &mut ZipArchive<BufReader<File>>, file_size: u64) -> Result<Vec<E
     Ok(plan)
 }
 
-/// The name of a method that is neither that of stored nor that of deflated entries.
+/// The name of a compression method other than stored and deflated.
 fn compression(method: CompressionMethod) -> String {
     const NAMES: [(CompressionMethod, &str); 5] = [
         (CompressionMethod::DEFLATE64, "deflate64"),
@@ -318,7 +319,7 @@ fn compression(method: CompressionMethod) -> String {
     known.map_or_else(|| format!("an unknown method, {method:?}"), |(_, name)| (*name).to_owned())
 }
 
-/// Writes one entry below `folder`, and no more bytes than the archive announced for it.
+/// Writes one entry below `folder`, but no more bytes than the archive announced for it.
 fn unpack(zip: &mut ZipArchive<BufReader<File>>, entry: &Entry, folder: &Path) -> Result<(), FmuProblem> {
     let name = &entry.name;
     let failed = |e: &dyn std::error::Error| FmuProblem::Archive(format!("entry {name:?}: {}", chain(e)));
@@ -341,14 +342,14 @@ fn unpack(zip: &mut ZipArchive<BufReader<File>>, entry: &Entry, folder: &Path) -
     Ok(())
 }
 
-/// `file://` URI of an absolute path.
+/// The `file://` URI of an absolute path.
 fn file_uri(path: &str) -> String {
     let path = if cfg!(windows) { path.replace('\\', "/") } else { path.to_owned() };
     let slash = if path.starts_with('/') { "" } else { "/" };
     format!("file://{slash}{}", utf8_percent_encode(&path, URI_PATH))
 }
 
-/// Whether an archive entry of this name would be written outside the target folder somewhere.
+/// Whether an archive entry of this name would be written outside the target folder on some system.
 fn leaves_archive(entry: &str) -> bool {
     entry.starts_with('/')
         || entry.contains(['\\', '\0'])

@@ -1,17 +1,17 @@
-//! Limits on the depth, width and length of an XML text, checked before a parser builds a tree from it. A
-//! document type is refused too, since its entities can expand without bound. Knows nothing of meaning: a text
-//! that is no XML passes here and fails in the parser.
+//! Limits the depth, width and length of an XML text before a parser builds a tree from it. A document type
+//! is refused too, since its entities can expand without bound. The limits ignore meaning: a text that is not
+//! XML passes here and fails in the parser.
 
 use crate::error::FmuProblem;
 
-/// The greatest depth of elements. A model description needs 6; annotations of tools may need more.
+/// The greatest depth of elements. A model description needs 6; tools' annotations may need more.
 pub(super) const MAX_DEPTH: usize = 256;
-/// The greatest number of attributes of an element. The widest of the schema has 13.
+/// The greatest number of attributes of an element. The widest in the schema has 13.
 pub(super) const MAX_ATTRIBUTES: usize = 256;
-/// The greatest number of elements: a million variables with their types and dependencies.
+/// The greatest number of elements: enough for a million variables with their types and dependencies.
 pub(super) const MAX_ELEMENTS: usize = 4_000_000;
 
-/// Passes over the text once, without memory of its own.
+/// Scans the text once, without allocating.
 pub(super) fn check(text: &str) -> Result<(), FmuProblem> {
     let bytes = text.as_bytes();
     let (mut at, mut depth, mut elements) = (0, 0_usize, 0_usize);
@@ -56,8 +56,8 @@ pub(super) fn check(text: &str) -> Result<(), FmuProblem> {
     Ok(())
 }
 
-/// The length of the tag at the start of `rest`, with its brackets, and the number of values in quotes
-/// in it; `None` where it does not end.
+/// The length of the tag at the start of `rest`, brackets included, and the number of its quoted values;
+/// `None` if it does not end.
 fn tag(rest: &[u8]) -> Option<(usize, usize)> {
     let (mut at, mut attributes) = (1, 0);
     loop {
@@ -72,7 +72,7 @@ fn tag(rest: &[u8]) -> Option<(usize, usize)> {
     }
 }
 
-/// First position of `wanted`, from `from` on.
+/// First position of `wanted` at or after `from`.
 fn find(bytes: &[u8], from: usize, wanted: &[u8]) -> Option<usize> {
     let tail = bytes.get(from..)?;
     if let [one] = wanted {
@@ -98,7 +98,7 @@ mod tests {
     fn what_is_within_bounds_passes() {
         let good = "<?xml version=\"1.0\"?><!-- <!DOCTYPE> --><a x='>' y=\"'\"><b/><![CDATA[<!DOCTYPE]]></a>";
         assert!(check(good).is_ok());
-        // Such texts are not for this module to judge.
+        // Such texts pass here; the parser judges them.
         for text in ["", "<", "<a", "<!--", "</a></a>", "<a x=\"", "<?"] {
             assert!(check(text).is_ok(), "{text}");
         }

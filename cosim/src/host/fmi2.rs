@@ -1,5 +1,5 @@
-//! One instance of an FMU of FMI 2.0, as a safe value. No call allocates unless it fails, but for the first that
-//! reads or writes whole numbers.
+//! One instance of an FMU of FMI 2.0, behind a safe interface. No call allocates unless it fails, except the
+//! first one that reads or writes integers.
 
 use std::rc::Rc;
 
@@ -37,7 +37,7 @@ functions! {
     }
 }
 
-/// An instance, freed on drop where the standard allows it.
+/// An instance, freed on drop if the standard allows it.
 pub(super) struct Instance {
     handle: Handle,
     functions: Functions,
@@ -46,7 +46,7 @@ pub(super) struct Instance {
 }
 
 impl Instance {
-    /// Makes an instance. `functions` are those of the loaded library of `of`.
+    /// Makes an instance. `functions` must be those of the loaded library of `of`.
     pub(super) fn new(
         of: (Rc<Fmu>, Rc<Description>),
         functions: Functions,
@@ -72,8 +72,8 @@ impl Instance {
         Ok(Self { handle, functions, whole: Vec::new(), truths: Vec::new() })
     }
 
-    /// Checks that there are as many values as references, since the FMU is told one number only. False: nothing is
-    /// to be done.
+    /// Checks that there are as many values as references, since the FMU receives only one count. Returns
+    /// false if there is nothing to do.
     fn fits(&self, references: &[u32], values: usize) -> Result<bool, Error> {
         if references.len() != values {
             return Err(self.handle.lengths_differ(references.len(), values));
@@ -116,7 +116,7 @@ impl Participant for Instance {
         terminate "fmi2Terminate";
     }
 
-    /// `fmi2DoStep`, with no way back to before `time`. Discard and Pending are errors too.
+    /// `fmi2DoStep`, without the option of going back to before `time`. Discard and Pending are errors too.
     fn do_step(&mut self, time: f64, step: f64) -> Result<(), Error> {
         self.handle.time = Some(time);
         self.handle.entering("fmi2DoStep");

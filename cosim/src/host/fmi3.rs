@@ -1,6 +1,6 @@
-//! One instance of a co-simulation FMU of FMI 3.0, as a safe value. It runs without event mode, early return and
-//! intermediate updates: the FMU handles its events itself. No call allocates unless it fails, but for the first that
-//! reads or writes so many numbers that are no doubles.
+//! One instance of a co-simulation FMU of FMI 3.0, behind a safe interface. It runs without event mode, early
+//! return and intermediate updates, so the FMU handles its events itself. No call allocates unless it fails,
+//! except the first one that reads or writes as many numbers of a type other than double.
 
 use std::rc::Rc;
 
@@ -62,23 +62,23 @@ functions! {
     }
 }
 
-/// The greatest size of a state as bytes.
+/// The greatest size of a serialised state, in bytes.
 const MAX_STATE: usize = 1 << 30;
 
-/// The share of a step by which the time reached may differ from the time asked for without a remark.
+/// The fraction of a step by which the time reached may differ from the requested time without a remark.
 const ON_TIME: f64 = 1e-6;
 
-/// An instance, freed on drop where the standard allows it.
+/// An instance, freed on drop if the standard allows it.
 pub(super) struct Instance {
     handle: Handle,
     functions: Functions,
     /// Start and stop time and tolerance, for the call that begins the initialisation.
     experiment: (f64, f64, Option<f64>),
-    /// Whether the last step asked for the end of the run.
+    /// Whether the FMU asked to end the run in the last step.
     asks_to_end: bool,
     /// Whether a step may be taken back.
     may_go_back: bool,
-    /// The first step that ended at another time than asked for: the time asked for and the time reached.
+    /// The first step that ended at the wrong time: the requested time and the time reached.
     off: Option<(f64, f64)>,
     float32: Vec<f32>,
     int8: Vec<i8>,
@@ -93,7 +93,7 @@ pub(super) struct Instance {
 }
 
 impl Instance {
-    /// Makes an instance. `functions` are those of the loaded library of `of`.
+    /// Makes an instance. `functions` must be those of the loaded library of `of`.
     pub(super) fn new(
         of: (Rc<Fmu>, Rc<Description>),
         functions: Functions,
@@ -105,9 +105,10 @@ impl Instance {
             of.0.archive.resource_path().map(|path| c_text("resource path", &path)).transpose()?;
         let handle = Handle::instantiate("fmi3InstantiateCoSimulation", of, name, |logging, is_logged| {
             let (environment, callback) = logging.plain();
-            // No variable. An FMU in Rust may make a slice of it, for which NULL is no address.
+            // No variables. An FMU written in Rust may turn the address into a slice, for which NULL is
+            // invalid.
             let required: [u32; 0] = [];
-            // SAFETY: the texts and the list live through the call; what the callback needs lives as long as the
+            // SAFETY: the texts and the list outlive the call; the data of the callback outlives the
             // instance.
             unsafe {
                 (functions.instantiate)(
@@ -146,13 +147,13 @@ impl Instance {
         })
     }
 
-    /// The state that a call gave.
+    /// The state that a call returned.
     fn saved(&self, call: &'static str, state: fmi3::State) -> Result<Saved, Error> {
         let state = std::ptr::NonNull::new(state);
         state.map(Saved).ok_or_else(|| self.handle.broken(call, "gave no state, though it returned fmi3OK"))
     }
 
-    /// One of the calls around structural parameters.
+    /// Makes a call that concerns structural parameters.
     fn configure(
         &mut self,
         name: &'static str,
@@ -203,7 +204,7 @@ impl Participant for Instance {
         self.configure("fmi3ExitConfigurationMode", self.functions.exit_configuration_mode)
     }
 
-    /// Keeps the numbers for the next call.
+    /// Stores the numbers until the initialisation begins.
     fn setup_experiment(
         &mut self,
         start_time: f64,
@@ -230,8 +231,8 @@ impl Participant for Instance {
         terminate "fmi3Terminate";
     }
 
-    /// `fmi3DoStep`, with no way back to before `time`. What needs event mode or an early return is an error, since
-    /// the FMU was told that there is neither.
+    /// `fmi3DoStep`, without the option of going back to before `time`. A need for event mode or early return
+    /// is an error, since the FMU was told that neither is available.
     fn do_step(&mut self, time: f64, step: f64) -> Result<(), Error> {
         self.handle.time = Some(time);
         self.handle.entering("fmi3DoStep");
@@ -276,7 +277,7 @@ impl Participant for Instance {
             let (call, component) = (self.functions.get_float64, self.handle.component());
             let (first, count) = (references.as_ptr(), references.len());
             let (data, total) = (values.as_mut_ptr(), values.len());
-            // SAFETY: the instance lives; as many elements can be read or written from both addresses as is said.
+            // SAFETY: the instance lives; both addresses are valid for the given numbers of elements.
             let status = unsafe { call(component, first, count, data, total) };
             return self.handle.check("fmi3GetFloat64", status);
         }
@@ -303,7 +304,7 @@ impl Participant for Instance {
             let (call, component) = (self.functions.set_float64, self.handle.component());
             let (first, count) = (references.as_ptr(), references.len());
             let (data, total) = (values.as_ptr(), values.len());
-            // SAFETY: the instance lives; as many elements can be read from both addresses as is said.
+            // SAFETY: the instance lives; both addresses are readable for the given numbers of elements.
             let status = unsafe { call(component, first, count, data, total) };
             return self.handle.check("fmi3SetFloat64", status);
         }
@@ -329,7 +330,7 @@ impl Participant for Instance {
         let texts = CTexts::new(self.handle.name(), texts)?;
         self.handle.entering("fmi3SetString");
         let component = self.handle.component();
-        // SAFETY: the instance lives; one reference and `count` texts can be read, which live through the call.
+        // SAFETY: the instance lives; one reference and `count` texts are readable, and outlive the call.
         let status = unsafe { call(component, &raw const reference, 1, texts.first(), count) };
         self.handle.check("fmi3SetString", status)
     }
@@ -417,7 +418,7 @@ impl Slave for Instance {
         }
         let mut bytes = vec![0; size];
         self.handle.entering("fmi3SerializeFMUState");
-        // SAFETY: the instance and the state live; as many bytes can be written as is said.
+        // SAFETY: the instance and the state live; `size` bytes are writable.
         let status = unsafe { call(self.handle.component(), state.0.as_ptr(), bytes.as_mut_ptr(), size) };
         self.handle.check("fmi3SerializeFMUState", status)?;
         Ok(Some(bytes))
@@ -451,7 +452,7 @@ impl Slave for Instance {
         let (unknown, known) = (&raw const unknown, &raw const known);
         let (seeds, given, to, wanted) =
             (seed.as_ptr(), seed.len(), derivatives.as_mut_ptr(), derivatives.len());
-        // SAFETY: the instance lives; as many elements can be read or written from the addresses as is said.
+        // SAFETY: the instance lives; all addresses are valid for the given numbers of elements.
         let status = unsafe { call(component, unknown, 1, known, 1, seeds, given, to, wanted) };
         self.handle.check(name, status)?;
         Ok(true)

@@ -1,5 +1,5 @@
-//! What instances of all versions share: how a call begins and ends, what its failure says, and when an instance
-//! must be left alone.
+//! What instances of both versions share: how a call begins and ends, how its failure is reported, and when
+//! an instance must be left alone.
 
 use std::ffi::{CString, c_char, c_void};
 use std::ptr::NonNull;
@@ -10,19 +10,19 @@ use super::number::{DataType, Loss};
 use super::{Description, Fmu, LogMessage, Status, journal};
 use crate::error::{CallFailure, Error};
 
-/// A living instance. It may be freed unless it returned a status after which the standard forbids that: fatal;
-/// pending, since its step may still be running; a number that is no status. Then it and its library are left
-/// as they are until the process ends.
+/// A live instance. It may be freed unless it returned a status after which the standard forbids it: fatal;
+/// pending, since its step may still be running; a number that is no status. In these cases the instance and
+/// its library are left alone until the process ends.
 pub(super) struct Handle {
     component: NonNull<c_void>,
     name: String,
-    /// The last time that the FMU got, in seconds; for error texts only.
+    /// The last time passed to the FMU, in seconds; only for error texts.
     pub(super) time: Option<f64>,
     warnings: u64,
     abandoned: bool,
     /// For the names of variables in error texts.
     description: Rc<Description>,
-    // These two outlive the instance, because `drop` frees it before fields go.
+    // These two must outlive the instance: `drop` frees it before the fields are dropped.
     logging: Logging,
     fmu: Rc<Fmu>,
 }
@@ -33,7 +33,7 @@ pub(super) fn c_text(field: &str, value: &str) -> Result<CString, Error> {
 }
 
 impl Handle {
-    /// Makes an instance by `make`, whose name is `call`.
+    /// Makes an instance with `make`; `call` is the name of the function.
     pub(super) fn instantiate(
         call: &'static str,
         (fmu, description): (Rc<Fmu>, Rc<Description>),
@@ -45,7 +45,7 @@ impl Handle {
         logging.call();
         let mut component = make(&logging, false);
         if component.is_null() && logging.messages().is_empty() {
-            // Some tell the reason only where the log is wanted.
+            // Some FMUs give the reason only if logging is on.
             component = make(&logging, true);
         }
         let Some(component) = NonNull::new(component) else {
@@ -67,7 +67,7 @@ impl Handle {
         &self.name
     }
 
-    /// Number of calls that returned a warning (they count as done).
+    /// Number of calls that returned a warning (they count as successful).
     pub(super) fn warnings(&self) -> u64 {
         self.warnings
     }
@@ -77,12 +77,12 @@ impl Handle {
         self.logging.messages()
     }
 
-    /// What was wrong with the first call of its log callback that was not as the standard says.
+    /// What was wrong with the first call of its log callback that violated the standard.
     pub(super) fn log_fault(&self) -> Option<String> {
         self.logging.fault()
     }
 
-    /// The texts that a call gave; `None` for each that is NULL.
+    /// The texts that a call returned; `None` for each that is NULL.
     pub(super) fn texts(
         &self,
         call: &'static str,
@@ -100,8 +100,8 @@ impl Handle {
         self.component.as_ptr()
     }
 
-    /// Whether the instance may be freed. After a fatal status of one instance no other of this FMU may be called
-    /// either.
+    /// Whether the instance may be freed. After a fatal status of one instance, no other instance of this FMU
+    /// may be called either.
     pub(super) fn may_be_freed(&self) -> bool {
         !self.abandoned && !self.fmu.abandoned.get()
     }
@@ -112,14 +112,14 @@ impl Handle {
         journal::entering(call, &self.name, self.fmu.path(), self.time);
     }
 
-    /// The end of a call.
+    /// Checks the status at the end of a call.
     #[inline]
     pub(super) fn check(&mut self, call: &'static str, status: impl Into<Status>) -> Result<(), Error> {
         let status = status.into();
         if status.is_ok() { Ok(()) } else { self.not_ok(call, status) }
     }
 
-    /// The end of a step to the time `end` (s).
+    /// Checks the status at the end of a step to the time `end` (s).
     #[inline]
     pub(super) fn check_step(
         &mut self,
@@ -146,7 +146,7 @@ impl Handle {
         Err(self.failure(call, Some(status), None))
     }
 
-    /// The error of a call that was done, but not as the standard says.
+    /// The error of a call that succeeded but violated the standard.
     #[cold]
     pub(super) fn broken(&self, call: &'static str, how: impl Into<String>) -> Error {
         self.failure(call, None, Some(how.into()))
@@ -164,7 +164,7 @@ impl Handle {
         })
     }
 
-    /// The error of a number that its type, or a run, cannot hold.
+    /// The error for a number that its type, or a run, cannot represent.
     #[cold]
     pub(super) fn lost(&self, call: &'static str, of: DataType, references: &[u32], loss: &Loss) -> Error {
         let mut element = loss.at;
@@ -190,14 +190,14 @@ impl Handle {
         )
     }
 
-    /// The error of a call with another number of values than of value references.
+    /// The error for a call with different numbers of values and value references.
     #[cold]
     pub(super) fn lengths_differ(&self, references: usize, values: usize) -> Error {
         let message = format!("{references} value references and {values} values; the numbers must be equal");
         Error::configuration(&self.name, message)
     }
 
-    /// The error of a type that cannot be read or written in this way.
+    /// The error for a type that cannot be read or written this way.
     #[cold]
     pub(super) fn has_no(&self, of: DataType, action: &str) -> Error {
         Error::configuration(&self.name, format!("a variable of type {of:?} cannot be {action} here"))
@@ -213,7 +213,7 @@ pub(super) struct CTexts {
 impl CTexts {
     pub(super) fn new(field: &str, texts: &[String]) -> Result<Self, Error> {
         let texts = texts.iter().map(|text| c_text(field, text)).collect::<Result<Vec<_>, _>>()?;
-        // The texts lie on the heap, so they stay where they are when the list moves.
+        // The texts are on the heap, so moving the list does not move them.
         let addresses = texts.iter().map(|text| text.as_ptr()).collect();
         Ok(Self { _texts: texts, addresses })
     }
@@ -231,7 +231,7 @@ macro_rules! get_through {
         $self.handle.entering($name);
         let (call, component) = ($self.functions.$function, $self.handle.component());
         let (references, count) = ($references.as_ptr(), $references.len());
-        // SAFETY: the instance lives; as many elements can be read or written from both addresses as is said.
+        // SAFETY: the instance lives; both addresses are valid for the given numbers of elements.
         let status = unsafe { call(component, references, count, first $(, $count)?) };
         $self.handle.check($name, status)?;
         number::give(&$self.$buffer, $values)
@@ -249,14 +249,14 @@ macro_rules! set_through {
         $self.handle.entering($name);
         let (call, component) = ($self.functions.$function, $self.handle.component());
         let (references, count) = ($references.as_ptr(), $references.len());
-        // SAFETY: the instance lives; as many elements can be read from both addresses as is said.
+        // SAFETY: the instance lives; both addresses are readable for the given numbers of elements.
         let status = unsafe { call(component, references, count, first $(, $count)?) };
         $self.handle.check($name, status)
     }};
 }
 pub(super) use set_through;
 
-/// Calls that take nothing but the instance.
+/// Calls whose only argument is the instance.
 macro_rules! plain_calls {
     ($($method:ident $name:literal;)*) => {$(
         fn $method(&mut self) -> Result<(), Error> {

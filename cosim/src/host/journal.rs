@@ -1,5 +1,6 @@
-//! A file that always names the last call into an FMU, for a process that watches this one. When an FMU ends its
-//! process, nobody else is left to tell. Off unless [`begin`] is called; then each call costs one small write.
+//! A file that always names the latest call into an FMU. If an FMU ends this process, the process that
+//! watches it reads there which call it was. Off unless [`begin`] is called; then each call costs one small
+//! write.
 
 use std::fmt;
 use std::fs::File;
@@ -9,23 +10,23 @@ use std::sync::OnceLock;
 
 use crate::error::brief_time;
 
-/// Bytes of the one record; longer names are cut.
+/// Size of the record in bytes; longer names are truncated.
 const RECORD: usize = 512;
-/// The content of the file when no FMU is called any more.
+/// The content of the file after the last call into an FMU.
 const FINISHED: &str = "finished";
 
 static JOURNAL: OnceLock<File> = OnceLock::new();
 
-/// The last call that a journal tells of.
+/// The last call recorded in a journal.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LastCall {
     /// The function, such as `fmi2DoStep`.
     pub call: String,
-    /// The instance, or the empty text before there is one.
+    /// The instance; empty before it exists.
     pub instance: String,
     /// The FMU's file.
     pub fmu: String,
-    /// The time of the instance in seconds, where it has one.
+    /// The time of the instance in seconds, if it has one.
     pub time: Option<f64>,
 }
 
@@ -43,12 +44,12 @@ impl fmt::Display for LastCall {
 }
 
 impl LastCall {
-    /// Reads the file at `path`: `None` where the watched process had finished with its FMUs or had not
-    /// begun with them.
+    /// Reads the file at `path`. `None` if the watched process had finished with its FMUs or had not called
+    /// any yet.
     ///
     /// # Errors
     ///
-    /// As reading the file.
+    /// Those of reading the file.
     pub fn read(path: &Path) -> io::Result<Option<Self>> {
         let text = String::from_utf8_lossy(&std::fs::read(path)?).into_owned();
         let mut lines = text.lines().map(|line| line.trim_end().to_owned());
@@ -57,17 +58,18 @@ impl LastCall {
         Ok((!last.call.is_empty() && last.call != FINISHED).then_some(last))
     }
 
-    /// Whether the watched process said that it had finished with its FMUs.
+    /// Whether the watched process recorded that it had finished with its FMUs.
     ///
     /// # Errors
     ///
-    /// As reading the file.
+    /// Those of reading the file.
     pub fn finished(path: &Path) -> io::Result<bool> {
         Ok(std::fs::read(path)?.starts_with(FINISHED.as_bytes()))
     }
 }
 
-/// Keeps the file at `path` from now on. A second call in a process changes nothing.
+/// Starts the journal in the file at `path`. A second call in the same process creates its file but leaves the
+/// journal where it is.
 ///
 /// # Errors
 ///
@@ -78,12 +80,12 @@ pub fn begin(path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Writes that no FMU is called any more.
+/// Records that no more FMUs will be called.
 pub fn finish() {
     write(FINISHED, "", "", None);
 }
 
-/// Writes which call comes next.
+/// Records the next call.
 #[inline]
 pub fn entering(call: &str, instance: &str, fmu: &Path, time: Option<f64>) {
     if JOURNAL.get().is_some() {
@@ -99,7 +101,7 @@ fn write(call: &str, instance: &str, fmu: &str, time: Option<f64>) {
     let mut record = [b' '; RECORD];
     let length = text.len().min(RECORD);
     record[..length].copy_from_slice(&text.as_bytes()[..length]);
-    // A failure to write makes the report poorer, not the run.
+    // If the write fails, the report is poorer but the run is unaffected.
     let _ = write_at_start(file, &record);
 }
 
@@ -110,6 +112,6 @@ fn write_at_start(file: &File, record: &[u8]) -> io::Result<()> {
 
 #[cfg(windows)]
 fn write_at_start(file: &File, record: &[u8]) -> io::Result<()> {
-    // One call, as there may be several threads. A disk that is full makes the record shorter.
+    // One system call, since there may be several threads. A full disk makes the record shorter.
     std::os::windows::fs::FileExt::seek_write(file, record, 0).map(|_| ())
 }

@@ -1,5 +1,5 @@
-//! A loaded shared library and the functions of its version of FMI that the host uses, all resolved when loading.
-//! This file trusts libraries to follow the signatures of the standard.
+//! A loaded shared library and the FMI functions that the host uses, all resolved at loading. This file
+//! trusts libraries to use the signatures of the standard.
 
 use std::ffi::c_char;
 use std::path::Path;
@@ -9,8 +9,8 @@ use super::logging::{self, Copied};
 use super::{Version, fmi2, fmi3};
 use crate::error::FmuProblem;
 
-/// Makes `Functions`: those that a run needs, each with the name and type of the standard, and those that it can do
-/// without.
+/// Defines `Functions`: the functions that a run requires, each with the name and type of the standard, and
+/// optional ones.
 macro_rules! functions {
     (
         needed { $($field:ident: $name:literal, $type:ty;)* }
@@ -24,11 +24,11 @@ macro_rules! functions {
         }
 
         impl Functions {
-            /// Looks for all of them in a library.
+            /// Resolves all of them in a library.
             ///
             /// # Errors
             ///
-            /// One that a run needs is not there.
+            /// A required function is missing.
             pub(super) fn resolve(library: &libloading::Library) -> Result<Self, FmuProblem> {
                 Ok(Self {
                     $($field: {
@@ -55,7 +55,7 @@ pub(super) enum Functions {
     Fmi3(fmi3::Functions),
 }
 
-/// A question about versions: the function, and how its answer must begin.
+/// A query of the version: the function, and how its answer must begin.
 type Question = (&'static str, unsafe extern "C" fn() -> *const c_char, &'static str);
 
 impl Functions {
@@ -73,7 +73,7 @@ impl Functions {
 /// A loaded library. The functions are valid while it lives.
 pub(super) struct Library {
     pub(super) functions: Functions,
-    /// Its answers on its version, by the function asked.
+    /// Its answers to the queries of its version, by function.
     pub(super) answers: Vec<(&'static str, String)>,
     _library: libloading::Library,
 }
@@ -85,8 +85,9 @@ impl std::fmt::Debug for Library {
 }
 
 impl Library {
-    /// Loads the library of an FMU of this `version`, resolves every function used and asks for its version. Its
-    /// undefined symbols are resolved now, so that none is missed in mid-run. Its own symbols stay its own.
+    /// Loads the library of an FMU of this `version`, resolves every function used and queries its version.
+    /// Its undefined symbols are resolved now, so that none turns out to be missing during a run. Its own
+    /// symbols stay local.
     pub(super) fn load(path: &Path, version: Version) -> Result<Self, FmuProblem> {
         let library = open(path).map_err(|e| FmuProblem::Load(refused(path, &chain(&e))))?;
         let functions = match version {
@@ -110,7 +111,7 @@ impl Library {
     }
 }
 
-/// The loader's words with the library's name, which those of Windows lack.
+/// The loader's message with the library's name, which messages of Windows lack.
 fn refused(path: &Path, words: &str) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     if words.contains(&*name) {
@@ -123,7 +124,7 @@ fn refused(path: &Path, words: &str) -> String {
 #[cfg(unix)]
 fn open(path: &Path) -> Result<libloading::Library, libloading::Error> {
     use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
-    // SAFETY: running the initialisers of the FMU is what the user asked for by naming it.
+    // SAFETY: running the FMU's initialisers is what the user asked for by naming it.
     let library = unsafe { Library::open(Some(path), RTLD_NOW | RTLD_LOCAL) }?;
     Ok(library.into())
 }
@@ -132,13 +133,13 @@ fn open(path: &Path) -> Result<libloading::Library, libloading::Error> {
 fn open(path: &Path) -> Result<libloading::Library, libloading::Error> {
     use libloading::os::windows::{LOAD_WITH_ALTERED_SEARCH_PATH, Library};
     use punctual_fmu::loadable;
-    // Libraries that it needs lie beside it (section 2.3), where the system would not look otherwise.
-    // SAFETY: running the initialisers of the FMU is what the user asked for by naming it.
+    // Libraries that it depends on lie beside it (section 2.3), where the system would not look by default.
+    // SAFETY: running the FMU's initialisers is what the user asked for by naming it.
     let library = unsafe { Library::load_with_flags(loadable(path), LOAD_WITH_ALTERED_SEARCH_PATH) }?;
     Ok(library.into())
 }
 
-/// Has a crash end this process at once. Windows would ask somebody first.
+/// Makes a crash end this process at once. By default Windows would show a dialog first.
 pub(crate) fn crash_at_once() {
     #[cfg(windows)]
     {

@@ -1,8 +1,8 @@
-//! Log messages of an FMU: the callbacks handed to it when it is instantiated, and the last messages kept for error
-//! texts. Knows nothing of calls and their order.
+//! Log messages of an FMU: the callbacks passed to it at instantiation, and the last messages, kept for error
+//! texts. It does not depend on the order of calls.
 //!
-//! What an FMU passes is not trusted. The component environment is looked up among those given out, never followed, and
-//! texts are copied by `logger.c`, which survives an address that cannot be read.
+//! Nothing that an FMU passes is trusted. The component environment is compared with those given out and
+//! never dereferenced. Texts are copied by `logger.c`, which survives unreadable addresses.
 
 use std::cell::Cell;
 use std::collections::VecDeque;
@@ -17,13 +17,13 @@ use super::{LogMessage, Status};
 /// Messages kept per instance; older ones are dropped.
 const KEPT: usize = 8;
 
-/// Characters kept of a category.
+/// The most characters kept of a category.
 const CATEGORY: usize = 100;
 
-/// Bytes kept of a text, as many as `logger.c` has room for.
+/// The most bytes kept of a text; `logger.c` has room for as many.
 const TEXT: usize = 2047;
 
-/// The greatest number of bytes read of a text that is a value.
+/// The most bytes read of a text that is a variable's value.
 const LONG_TEXT: usize = 1 << 20;
 
 unsafe extern "C" {
@@ -43,50 +43,50 @@ unsafe extern "C" {
     fn free(pointer: *mut c_void);
 }
 
-/// The callbacks of an instance, and its messages. It is never given back to the system, since an FMU may call
-/// after its end; the next instance gets it.
-struct Desk {
-    /// Never changed. Its environment is the address of the desk.
+/// The callbacks of an instance, and its messages. The memory is never freed, since an FMU may call after its
+/// instance is gone; the next instance reuses it.
+struct Channel {
+    /// Never changed. The environment is the address of this channel.
     callbacks: CallbackFunctions,
     // An FMU may log from a thread of its own.
     inbox: Mutex<Inbox>,
 }
 
-// SAFETY: the callbacks are read only, and the address in them is followed by nobody.
-unsafe impl Sync for Desk {}
+// SAFETY: the callbacks are only read, and the address in them is never dereferenced.
+unsafe impl Sync for Channel {}
 
 #[derive(Default)]
 struct Inbox {
     is_taken: bool,
     messages: VecDeque<LogMessage>,
-    /// What was wrong with the first message that was not as the standard says.
+    /// What was wrong with the first message that violated the standard.
     fault: Option<String>,
 }
 
-/// All desks ever made.
-static DESKS: Mutex<Vec<&'static Desk>> = Mutex::new(Vec::new());
+/// All channels ever made.
+static CHANNELS: Mutex<Vec<&'static Channel>> = Mutex::new(Vec::new());
 
 thread_local! {
-    /// That of the instance that this thread called last.
-    static CALLED: Cell<Option<&'static Desk>> = const { Cell::new(None) };
+    /// The channel of the instance that this thread called last.
+    static CALLED: Cell<Option<&'static Channel>> = const { Cell::new(None) };
 }
 
 fn locked<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
     of.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-impl Desk {
-    /// One that nobody has.
+impl Channel {
+    /// Takes a channel that is not in use.
     fn take() -> &'static Self {
-        let mut desks = locked(&DESKS);
-        for desk in desks.iter().copied() {
-            let mut inbox = locked(&desk.inbox);
+        let mut channels = locked(&CHANNELS);
+        for channel in channels.iter().copied() {
+            let mut inbox = locked(&channel.inbox);
             if !inbox.is_taken {
                 *inbox = Inbox { is_taken: true, ..Inbox::default() };
-                return desk;
+                return channel;
             }
         }
-        let desk = Box::leak(Box::new(Self {
+        let channel = Box::leak(Box::new(Self {
             callbacks: CallbackFunctions {
                 logger: Some(punctual_host_logger),
                 allocate_memory: Some(calloc),
@@ -96,18 +96,18 @@ impl Desk {
             },
             inbox: Mutex::new(Inbox { is_taken: true, ..Inbox::default() }),
         }));
-        desk.callbacks.environment = std::ptr::from_mut(desk).cast();
-        desks.push(desk);
-        desk
+        channel.callbacks.environment = std::ptr::from_mut(channel).cast();
+        channels.push(channel);
+        channel
     }
 
-    /// That of a message: the one that the FMU names, else that of the instance called, else the only one there is. With it
-    /// what is wrong with the environment.
+    /// The channel of a message: the one whose environment the FMU passed, else that of the instance called
+    /// last, else the only one in use. Also returns what is wrong with the environment.
     fn of(environment: *const c_void) -> Option<(&'static Self, Option<String>)> {
-        let called = CALLED.get().filter(|desk| locked(&desk.inbox).is_taken);
-        let desks = locked(&DESKS);
-        let mut taken = desks.iter().copied().filter(|desk| locked(&desk.inbox).is_taken);
-        let named = taken.clone().find(|desk| std::ptr::eq(desk.callbacks.environment, environment));
+        let called = CALLED.get().filter(|channel| locked(&channel.inbox).is_taken);
+        let channels = locked(&CHANNELS);
+        let mut taken = channels.iter().copied().filter(|channel| locked(&channel.inbox).is_taken);
+        let named = taken.clone().find(|channel| std::ptr::eq(channel.callbacks.environment, environment));
         match (named, called) {
             (Some(named), Some(called)) if !std::ptr::eq(named, called) => {
                 Some((named, Some("the component environment was that of another instance".to_owned())))
@@ -116,7 +116,9 @@ impl Desk {
             (None, called) => {
                 let only = taken.next().filter(|_| taken.next().is_none());
                 let what = if environment.is_null() { "NULL" } else { "not the one given" };
-                called.or(only).map(|desk| (desk, Some(format!("the component environment was {what}"))))
+                called
+                    .or(only)
+                    .map(|channel| (channel, Some(format!("the component environment was {what}"))))
             }
         }
     }
@@ -124,61 +126,62 @@ impl Desk {
 
 /// The callbacks of one instance and the messages it sent. Must outlive the instance.
 pub(super) struct Logging {
-    desk: &'static Desk,
-    /// Whether the desk stays taken.
+    channel: &'static Channel,
+    /// Whether the channel stays in use after the drop.
     leaks: Cell<bool>,
 }
 
 impl Logging {
     pub(super) fn new() -> Self {
-        Self { desk: Desk::take(), leaks: Cell::new(false) }
+        Self { channel: Channel::take(), leaks: Cell::new(false) }
     }
 
-    /// The address for `fmi2Instantiate`, valid for ever.
+    /// The address for `fmi2Instantiate`, valid forever.
     pub(super) fn callbacks(&self) -> *const CallbackFunctions {
-        &raw const self.desk.callbacks
+        &raw const self.channel.callbacks
     }
 
     /// The environment and the callback for `fmi3InstantiateCoSimulation`.
     pub(super) fn plain(&self) -> (fmi3::Environment, fmi3::LogMessage) {
-        (self.desk.callbacks.environment, Some(take))
+        (self.channel.callbacks.environment, Some(take))
     }
 
-    /// Says that the instance is called next. A message that does not tell whose it is will be this one's.
+    /// Records that this instance is called next. A message without a valid environment will be attributed to
+    /// it.
     #[inline]
     pub(super) fn call(&self) {
-        CALLED.set(Some(self.desk));
+        CALLED.set(Some(self.channel));
     }
 
-    /// Keeps the callbacks for an FMU that may still use them.
+    /// Keeps the callbacks reserved for an FMU that may still use them.
     pub(super) fn leak(&self) {
         self.leaks.set(true);
     }
 
     /// The messages kept, oldest first.
     pub(super) fn messages(&self) -> Vec<LogMessage> {
-        locked(&self.desk.inbox).messages.iter().cloned().collect()
+        locked(&self.channel.inbox).messages.iter().cloned().collect()
     }
 
-    /// What was wrong with the first message that was not as the standard says.
+    /// What was wrong with the first message that violated the standard.
     pub(super) fn fault(&self) -> Option<String> {
-        locked(&self.desk.inbox).fault.clone()
+        locked(&self.channel.inbox).fault.clone()
     }
 }
 
 impl Drop for Logging {
     fn drop(&mut self) {
         if !self.leaks.get() {
-            locked(&self.desk.inbox).is_taken = false;
+            locked(&self.channel.inbox).is_taken = false;
         }
     }
 }
 
-/// Called by `logger.c` with finished text.
+/// Called by `logger.c` with a formatted text.
 ///
 /// # Safety
 ///
-/// `text` is NULL or ends in a zero byte. All else may be anything.
+/// `text` is NULL or ends in a zero byte. The other arguments may be anything.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn punctual_host_receive(
     environment: *const c_void,
@@ -203,9 +206,9 @@ unsafe extern "C" fn take(
     keep(environment, status.into(), category, text);
 }
 
-/// Keeps a message, and drops the oldest where there are too many. One that is nobody's is dropped.
+/// Keeps a message, and drops the oldest one if there are too many. A message without an owner is dropped.
 fn keep(environment: *const c_void, status: Status, category: Text, text: Text) {
-    let Some((desk, mut fault)) = Desk::of(environment) else { return };
+    let Some((channel, mut fault)) = Channel::of(environment) else { return };
     let category = copied(category, TEXT);
     let text = copied(text, TEXT);
     for (what, copied) in [("category", &category), ("message", &text)] {
@@ -218,7 +221,7 @@ fn keep(environment: *const c_void, status: Status, category: Text, text: Text) 
     }
     let category = category.text().unwrap_or_default();
     let text = text.text().unwrap_or_default();
-    let mut inbox = locked(&desk.inbox);
+    let mut inbox = locked(&channel.inbox);
     if inbox.messages.len() == KEPT {
         inbox.messages.pop_front();
     }
@@ -230,20 +233,20 @@ fn keep(environment: *const c_void, status: Status, category: Text, text: Text) 
     inbox.fault = inbox.fault.take().or(fault);
 }
 
-/// The text without control characters, which could control a terminal; line breaks and tabs stay.
+/// The text without control characters, which could manipulate a terminal; line breaks and tabs are kept.
 fn printable(text: &str) -> String {
     let harmless = |c: char| !c.is_control() || c == '\n' || c == '\t';
     text.chars().map(|c| if harmless(c) { c } else { char::REPLACEMENT_CHARACTER }).collect()
 }
 
-/// A text at an address that an FMU gave.
+/// A text at an address that an FMU passed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Copied {
-    /// Its text, invalid UTF-8 replaced.
+    /// The text, with invalid UTF-8 replaced.
     Text(String),
     /// NULL.
     Null,
-    /// An address that cannot be read.
+    /// The address cannot be read.
     Lost,
 }
 
@@ -258,12 +261,12 @@ impl Copied {
     }
 }
 
-/// A copy of a C text that is a value of an FMU, cut after a mebibyte.
+/// Copies a C text that is the value of a variable, truncated to a mebibyte.
 pub(super) fn value(text: *const c_char) -> Copied {
     copied(text, LONG_TEXT)
 }
 
-/// A copy of a C text, cut after `most` bytes. `text` may be any address.
+/// Copies a C text, truncated to `most` bytes. `text` may be any address.
 fn copied(text: *const c_char, most: usize) -> Copied {
     if text.is_null() {
         return Copied::Null;
@@ -272,7 +275,7 @@ fn copied(text: *const c_char, most: usize) -> Copied {
     loop {
         let mut part = [0_u8; TEXT + 1];
         let from = text.wrapping_add(bytes.len());
-        // SAFETY: `part` can be written; the other address may be anything.
+        // SAFETY: `part` is writable; the other address may be anything.
         let length = unsafe { punctual_host_text(from, part.as_mut_ptr().cast(), part.len()) };
         let Ok(length) = usize::try_from(length) else { break };
         bytes.extend_from_slice(&part[..length]);
@@ -283,7 +286,7 @@ fn copied(text: *const c_char, most: usize) -> Copied {
     if bytes.is_empty() { Copied::Lost } else { Copied::Text(whole(&bytes, most)) }
 }
 
-/// At most so many bytes as text, invalid UTF-8 replaced. A character that is cut at the end is left out.
+/// At most `most` bytes as text, with invalid UTF-8 replaced. A character cut off at the end is left out.
 fn whole(bytes: &[u8], most: usize) -> String {
     let mut end = bytes.len().min(most);
     let lead = bytes[..end].iter().rposition(|byte| byte & 0xC0 != 0x80);
@@ -303,7 +306,7 @@ fn whole(bytes: &[u8], most: usize) -> String {
 mod tests {
     use super::*;
 
-    /// One of two instances, neither of which was called: a message that names neither is nobody's.
+    /// One of two instances, neither of which was called: a message that names neither has no owner.
     fn one_of_two() -> (Logging, Logging) {
         CALLED.set(None);
         (Logging::new(), Logging::new())
@@ -312,10 +315,10 @@ mod tests {
     #[test]
     fn formats_and_tolerates_null_and_strange_statuses() {
         let (logging, _other) = one_of_two();
-        let environment = logging.desk.callbacks.environment;
+        let environment = logging.channel.callbacks.environment;
         let null = std::ptr::null();
         let (instance, category, format) = (c"i".as_ptr(), c"logError".as_ptr(), c"%s is %d".as_ptr());
-        // SAFETY: the environment lives; texts are literals; arguments match the format.
+        // SAFETY: the environment is live; texts are literals; arguments match the format.
         unsafe {
             punctual_host_logger(
                 environment,
@@ -331,7 +334,7 @@ mod tests {
         unsafe { punctual_host_logger(environment, null, fmi2::Status(-5), null, null) };
         // SAFETY: any environment is allowed.
         unsafe { punctual_host_logger(std::ptr::null_mut(), null, fmi2::Status::OK, null, c"lost".as_ptr()) };
-        // SAFETY: as above. A conversion that writes is not carried out: nothing is there to write to.
+        // SAFETY: as above. A conversion that writes is not carried out, since there is nothing to write to.
         unsafe {
             punctual_host_logger(environment, instance, fmi2::Status::OK, null, c"100%n %s\x1b[2J".as_ptr());
         };
@@ -345,7 +348,7 @@ mod tests {
     #[test]
     fn keeps_the_last_messages_and_bounds_their_length() {
         let logging = Logging::new();
-        let environment = logging.desk.callbacks.environment;
+        let environment = logging.channel.callbacks.environment;
         let long = std::ffi::CString::new("x".repeat(10_000)).unwrap();
         for _ in 0..3 * KEPT {
             // SAFETY: the environment lives; the text has no conversion.
@@ -386,11 +389,12 @@ mod tests {
         assert_eq!(messages[2].text.len(), TEXT - 1);
     }
 
-    /// Every argument is any address, near ones and far ones, readable or not: a message that gets lost is no harm, a crash is.
+    /// Every argument takes any address, near or far, readable or not. Losing a message is acceptable, a
+    /// crash is not.
     #[test]
     fn any_address_is_survived() {
         let logging = Logging::new();
-        let (given, own) = (logging.desk.callbacks.environment.addr(), c"a text".as_ptr().addr());
+        let (given, own) = (logging.channel.callbacks.environment.addr(), c"a text".as_ptr().addr());
         let mut state = 20_261_128_u64;
         let mut draw = || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -408,7 +412,7 @@ mod tests {
         };
         for _ in 0..100_000 {
             let [environment, name, category, message] = std::array::from_fn(|_| draw() as *mut c_char);
-            // SAFETY: of these arguments nothing is asked.
+            // SAFETY: the arguments may be anything.
             unsafe {
                 punctual_host_logger(
                     environment.cast(),
@@ -460,7 +464,7 @@ mod tests {
     fn a_message_is_that_of_the_instance_named_or_called() {
         let (one, other) = one_of_two();
         let say = |environment: *mut c_void| {
-            // SAFETY: of the environment nothing is asked; the text is a literal.
+            // SAFETY: the environment may be anything; the text is a literal.
             unsafe {
                 punctual_host_logger(
                     environment,
@@ -473,16 +477,16 @@ mod tests {
         };
         let counts = || (one.messages().len(), other.messages().len());
         other.call();
-        say(other.desk.callbacks.environment);
+        say(other.channel.callbacks.environment);
         assert_eq!((counts(), other.fault()), ((0, 1), None));
         say(std::ptr::without_provenance_mut(1));
         assert_eq!(counts(), (0, 2));
         assert!(other.fault().is_some_and(|fault| fault.ends_with("was not the one given")));
-        say(one.desk.callbacks.environment);
+        say(one.channel.callbacks.environment);
         assert_eq!(counts(), (1, 2));
         assert!(one.fault().is_some_and(|fault| fault.ends_with("was that of another instance")));
-        // The desk of an instance that has gone is called in vain, until another has it.
-        let gone = one.desk.callbacks.environment;
+        // Calls on the channel of an instance that is gone have no effect until another instance has it.
+        let gone = one.channel.callbacks.environment;
         drop(one);
         say(gone);
         assert_eq!(other.messages().len(), 3);

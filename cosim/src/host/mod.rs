@@ -1,6 +1,6 @@
-//! A host for co-simulation FMUs of FMI 2.0 and 3.0: unpack, describe, load, instantiate, call. The only module of this
-//! crate with unsafe code. All it offers is safe, as far as the FMU itself keeps to the standard. Knows nothing
-//! of coupling.
+//! A host for co-simulation FMUs of FMI 2.0 and 3.0: it unpacks, describes, loads, instantiates and calls
+//! them. The only module of this crate with unsafe code. Its interface is safe as long as the FMU itself
+//! follows the standard. It knows nothing of coupling.
 
 mod archive;
 mod bounds;
@@ -38,19 +38,19 @@ use library::{Functions, Library};
 use crate::error::{Error, FmuProblem};
 pub use crate::status::{LogMessage, Status};
 
-/// An FMU: its archive unpacked, its description read, its library loaded when first needed.
+/// An FMU, with its archive unpacked and its description read. The library is loaded when first needed.
 #[derive(Debug)]
 pub struct Fmu {
     description: Rc<Description>,
-    // Dropped before the archive: the library is unloaded before its file is removed.
+    // Dropped before the archive, since the library must be unloaded before its file is removed.
     library: OnceCell<Library>,
-    /// Set once an instance was left in a state in which it may still run.
+    /// Set once an instance was abandoned in a state in which it may still be running.
     abandoned: Cell<bool>,
     archive: Archive,
 }
 
 impl Fmu {
-    /// Unpacks and reads the FMU at `path`; nothing of it is run.
+    /// Unpacks and reads the FMU at `path`; none of its code is run.
     ///
     /// # Errors
     ///
@@ -60,7 +60,7 @@ impl Fmu {
         Self::of(Archive::open(path)?)
     }
 
-    /// Reads the FMU of an archive that is unpacked.
+    /// Reads the FMU in an unpacked archive.
     ///
     /// # Errors
     ///
@@ -85,7 +85,7 @@ impl Fmu {
         &self.description
     }
 
-    /// The platforms it has binaries for, such as `linux64`; sorted.
+    /// The platforms that it has binaries for, such as `linux64`; sorted.
     pub fn platforms(&self) -> &[String] {
         self.archive.platforms()
     }
@@ -115,7 +115,7 @@ impl Fmu {
         Ok(self.library.get_or_init(|| library))
     }
 
-    /// What its library answers on its version, by the function asked: `fmi2GetVersion` and `fmi2GetTypesPlatform`, or
+    /// The library's answers on its version, by function: `fmi2GetVersion` and `fmi2GetTypesPlatform`, or
     /// `fmi3GetVersion`. Loads the library.
     ///
     /// # Errors
@@ -125,13 +125,13 @@ impl Fmu {
         Ok(&self.library()?.answers)
     }
 
-    /// Makes an instance called `name`; the first one loads the library. `description` is that of the FMU, with the
-    /// sizes of its arrays as they will be set.
+    /// Makes an instance called `name`; the first one loads the library. `description` is that of the FMU,
+    /// with the array sizes that will be set.
     ///
     /// # Errors
     ///
-    /// It needs what this program does not offer, the library cannot be loaded or lacks a function, `name` holds a zero
-    /// byte, or the FMU refuses (its log says why).
+    /// The FMU needs something that this program does not offer, the library cannot be loaded or lacks a
+    /// function, `name` contains a zero byte, or the FMU refuses (its log says why).
     pub fn instantiate(
         self: &Rc<Self>,
         description: &Rc<Description>,
@@ -147,7 +147,7 @@ impl Fmu {
         })
     }
 
-    /// The text of a file in its `resources/`; `None` where there is no such text.
+    /// The text of a file in its `resources/`; `None` if there is no such text.
     pub fn resource(&self, name: &str) -> Option<String> {
         let entry = format!("resources/{name}");
         let is_there = self.archive.entries().contains(&entry);

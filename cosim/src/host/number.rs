@@ -1,11 +1,11 @@
-//! Types of values, and numbers on their way between the doubles of a run and the type of a variable. A number
-//! that would become another one on this way is refused.
+//! Types of values, and the conversion of numbers between the doubles of a run and the type of a variable. A
+//! number that the conversion would change is refused.
 
 use std::fmt::Display;
 
 pub use punctual_modeldescription::fmi3::DataType;
 
-/// What can be connected: types of the same family.
+/// Families of types that can be connected with each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Family {
     /// Floats and doubles.
@@ -14,9 +14,9 @@ pub enum Family {
     Integer,
     /// Enumerations.
     Enumeration,
-    /// Truth values.
+    /// Booleans.
     Boolean,
-    /// What is no number: texts, bytes, clocks.
+    /// Types without numbers: texts, bytes, clocks.
     Other,
 }
 
@@ -33,31 +33,32 @@ impl Family {
     }
 }
 
-/// The least and the greatest whole number that a type holds and a run can carry; `None` for what is no whole number.
+/// The least and the greatest whole number that both the type and a run can represent; `None` for other
+/// types.
 pub fn whole_range(of: DataType) -> Option<(f64, f64)> {
     let (least, greatest) = of.limits()?;
     Some(((least as f64).max(-WHOLE), (greatest as f64).min(WHOLE)))
 }
 
-/// A run carries numbers as doubles, which hold every whole number from −2⁵³ to 2⁵³.
+/// A run stores numbers as doubles, which represent every whole number from −2⁵³ to 2⁵³.
 const WHOLE: f64 = 9_007_199_254_740_992.0;
 
-/// A number of an FMU.
+/// A number type of FMUs.
 pub(crate) trait Number: Copy + Default + Display {
-    /// The least and the greatest value that a run can carry.
+    /// The least and the greatest value that a run can represent.
     const RANGE: (f64, f64);
 
     /// The same number as a double, if there is one.
     fn to_double(self) -> Option<f64>;
 
-    /// The number that `value` is, if it is one of this type; of a float the nearest.
+    /// `value` as a number of this type, if it is one; a float rounds to the nearest.
     fn of_double(value: f64) -> Option<Self>;
 }
 
 macro_rules! whole {
     ($($type:ty: $double:expr;)*) => {$(
         impl Number for $type {
-            // Of the types of 64 bits the bound of a double counts.
+            // For 64-bit types, the bound of doubles applies.
             const RANGE: (f64, f64) = (
                 (<$type>::MIN as f64).max(-WHOLE),
                 (<$type>::MAX as f64).min(WHOLE),
@@ -84,7 +85,7 @@ whole! {
     u16: f64::from;
     i32: f64::from;
     u32: f64::from;
-    // The nearest double, which is refused where it is another number.
+    // The nearest double, which is refused if it differs.
     i64: |number| number as f64;
     u64: |number| number as f64;
 }
@@ -97,13 +98,13 @@ impl Number for f32 {
     }
 
     fn of_double(value: f64) -> Option<Self> {
-        // What is not a number or infinite stays so.
+        // NaN and infinities are preserved.
         let nearest = value as f32;
         (nearest.is_finite() || !value.is_finite()).then_some(nearest)
     }
 }
 
-/// A truth value in the form of a library: 0 is false, any other bits are true.
+/// A Boolean as libraries represent it: 0 is false, all other bit patterns are true.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(transparent)]
 pub(crate) struct Truth<T>(pub(crate) T);
@@ -126,7 +127,7 @@ impl<T: Copy + Default + Display + PartialEq + From<bool>> Number for Truth<T> {
     }
 }
 
-/// A number that cannot be carried over.
+/// A number that cannot be converted.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Loss {
     /// Its position among the values.
@@ -137,14 +138,14 @@ pub(crate) struct Loss {
     pub(crate) range: (f64, f64),
 }
 
-/// Room for `count` numbers in a buffer, which grows where it is too small.
+/// Makes room for `count` numbers in a buffer, which grows if it is too small.
 pub(crate) fn room<T: Number>(buffer: &mut Vec<T>, count: usize) -> *mut T {
     buffer.clear();
     buffer.resize(count, T::default());
     buffer.as_mut_ptr()
 }
 
-/// Gives numbers on as doubles.
+/// Copies numbers out as doubles.
 pub(crate) fn give<T: Number>(numbers: &[T], values: &mut [f64]) -> Result<(), Loss> {
     for (at, (number, value)) in numbers.iter().zip(values).enumerate() {
         let lost = || Loss { at, value: number.to_string(), range: T::RANGE };
@@ -153,7 +154,7 @@ pub(crate) fn give<T: Number>(numbers: &[T], values: &mut [f64]) -> Result<(), L
     Ok(())
 }
 
-/// Fills a buffer with doubles as numbers, and says where they are.
+/// Fills a buffer with doubles converted to numbers, and returns its address.
 pub(crate) fn take<T: Number>(buffer: &mut Vec<T>, values: &[f64]) -> Result<*const T, Loss> {
     buffer.clear();
     for (at, value) in values.iter().enumerate() {
@@ -175,7 +176,7 @@ mod tests {
         assert_eq!(i64::of_double(-WHOLE - 2.0), None);
         assert_eq!(9_007_199_254_740_992_u64.to_double(), Some(WHOLE));
         assert_eq!((WHOLE as u64 + 2).to_double(), None);
-        // Its double is that of the number before it.
+        // Its double would be that of the number before it.
         assert_eq!((WHOLE as u64 + 1).to_double(), None);
         assert_eq!(u64::MAX.to_double(), None);
         assert_eq!(whole_range(DataType::Int16), Some(i16::RANGE));

@@ -1,5 +1,5 @@
-//! The calls of co-simulation that a master makes, whoever answers them and whatever their version is; and those
-//! that somebody makes who looks at an FMU more closely.
+//! The calls that a master makes in a co-simulation, independent of the version of FMI and of who answers
+//! them. Also the calls that examine an FMU more closely.
 
 use std::ffi::c_void;
 use std::ptr::NonNull;
@@ -12,22 +12,22 @@ use super::number::DataType;
 use super::{Description, Fmu, LogMessage, Version};
 use crate::error::Error;
 
-/// An instance that a master steps: an FMU's, or one of this program's own blocks in process.
+/// An instance that a master steps: that of an FMU, or one of this program's own blocks in process.
 ///
-/// Numbers travel as doubles. A Boolean is 0 or 1. Of an array all elements are read and written together, in
-/// row-major order, by one value reference.
+/// Numbers are passed as doubles. A Boolean is 0 or 1. All elements of an array are read and written
+/// together, in row-major order, with one value reference.
 pub trait Participant {
     /// The instance name, which is that of its component.
     fn name(&self) -> &str;
 
-    /// Goes back to the state after instantiation.
+    /// Returns to the state after instantiation.
     ///
     /// # Errors
     ///
-    /// The call is refused; so for every call below.
+    /// The call is refused. The same holds for every call below.
     fn reset(&mut self) -> Result<(), Error>;
 
-    /// Begins to set structural parameters, which FMI 3.0 alone has.
+    /// Begins to set structural parameters, which only FMI 3.0 has.
     ///
     /// # Errors
     ///
@@ -36,7 +36,7 @@ pub trait Participant {
         Ok(())
     }
 
-    /// Ends that.
+    /// Ends the configuration mode.
     ///
     /// # Errors
     ///
@@ -45,7 +45,8 @@ pub trait Participant {
         Ok(())
     }
 
-    /// Sets start and stop time of the run, in s, and the relative tolerance of the FMU's own solver, if it is to get one.
+    /// Sets the start and stop time of the run, in s, and optionally the relative tolerance of the FMU's own
+    /// solver.
     ///
     /// # Errors
     ///
@@ -78,7 +79,7 @@ pub trait Participant {
     /// As above.
     fn do_step(&mut self, time: f64, step: f64) -> Result<(), Error>;
 
-    /// Whether its last step asked for the end of the run.
+    /// Whether the FMU asked to end the run in its last step.
     fn asks_to_end(&self) -> bool {
         false
     }
@@ -90,11 +91,11 @@ pub trait Participant {
     /// As above.
     fn terminate(&mut self) -> Result<(), Error>;
 
-    /// Reads variables of type `of` by their value references. Nothing is called where there are none.
+    /// Reads variables of type `of` by their value references. Without references, nothing is called.
     ///
     /// # Errors
     ///
-    /// As above; also for a number that is no double, and a type without numbers.
+    /// As above; also for a number that no double represents, and for a type without numbers.
     fn get(&mut self, of: DataType, references: &[u32], values: &mut [f64]) -> Result<(), Error>;
 
     /// Writes variables of type `of`.
@@ -104,22 +105,22 @@ pub trait Participant {
     /// As above; also for a number that the type cannot hold.
     fn set(&mut self, of: DataType, references: &[u32], values: &[f64]) -> Result<(), Error>;
 
-    /// Where it keeps an input or output, if it is an instance in this process: then [`Self::read`] and [`Self::write`]
-    /// are faster than [`Self::get`] and [`Self::set`].
+    /// The storage place of an input or output, if the instance runs in this process. Then [`Self::read`] and
+    /// [`Self::write`] are faster than [`Self::get`] and [`Self::set`].
     fn place(&self, _causality: Causality, _of: DataType, _reference: u32) -> Option<Place> {
         None
     }
 
-    /// Reads the numbers at `places`, which it reported.
+    /// Reads the numbers at `places`, which [`Self::place`] returned.
     ///
     /// # Errors
     ///
-    /// As above; also where it tells none.
+    /// As above; also if the participant has no places.
     fn read(&mut self, _places: &[Place], _values: &mut [f64]) -> Result<(), Error> {
         Err(Error::broken(self.name(), "tells no places to read"))
     }
 
-    /// Writes numbers to `places`, which it reported as those of inputs.
+    /// Writes numbers to `places`, which [`Self::place`] returned for inputs.
     ///
     /// # Errors
     ///
@@ -132,14 +133,14 @@ pub trait Participant {
     ///
     /// # Errors
     ///
-    /// As above; also for texts with a zero byte.
+    /// As above; also for texts that contain a zero byte.
     fn set_text(&mut self, reference: u32, texts: &[String]) -> Result<(), Error>;
 
     /// The instance's remark on a run that succeeded, if it has one.
     fn remark(&self) -> Option<String>;
 }
 
-/// A state of an instance, as its library knows it. Its memory is given back by [`Slave::release`].
+/// A state of an instance, owned by its library. [`Slave::release`] frees its memory.
 #[derive(Debug)]
 pub struct Saved(pub(super) NonNull<c_void>);
 
@@ -148,28 +149,28 @@ pub trait Slave: Participant {
     /// Its version of FMI.
     fn version(&self) -> Version;
 
-    /// Number of calls that returned a warning (they count as done).
+    /// Number of calls that returned a warning (they count as successful).
     fn warnings(&self) -> u64;
 
     /// Its last log messages, oldest first; at most eight.
     fn log(&self) -> Vec<LogMessage>;
 
-    /// What was wrong with the first call of its log callback that was not as the standard says.
+    /// What was wrong with the first call of its log callback that violated the standard.
     fn log_fault(&self) -> Option<String>;
 
-    /// Reads a text, or all `count` texts of an array; `None` for each that is NULL, and for all where there is no
-    /// such function.
+    /// Reads a text, or all `count` texts of an array; `None` for each that is NULL, and for all if the FMU
+    /// lacks the function.
     ///
     /// # Errors
     ///
     /// As for a [`Participant`].
     fn get_text(&mut self, reference: u32, count: usize) -> Result<Option<Vec<Option<String>>>, Error>;
 
-    /// Tells the instance with each step whether it may be taken back to before it, by [`Slave::restore`]. It may not
-    /// unless this is said.
+    /// Sets whether a later [`Slave::restore`] may go back to before a step; the FMU learns this with each
+    /// step. It may not by default.
     fn may_go_back(&mut self, _may: bool) {}
 
-    /// Saves its state; `None` where it offers no such call. So for the calls below.
+    /// Saves its state; `None` if it does not offer the call. The same holds for the calls below.
     ///
     /// # Errors
     ///
@@ -178,7 +179,7 @@ pub trait Slave: Participant {
         Ok(None)
     }
 
-    /// Goes back to a state of this FMU.
+    /// Returns to a saved state of this FMU.
     ///
     /// # Errors
     ///
@@ -187,7 +188,7 @@ pub trait Slave: Participant {
         Ok(())
     }
 
-    /// Gives the memory of a state back.
+    /// Frees the memory of a state.
     ///
     /// # Errors
     ///
@@ -196,7 +197,7 @@ pub trait Slave: Participant {
         Ok(())
     }
 
-    /// Turns a state to bytes.
+    /// Serialises a state.
     ///
     /// # Errors
     ///
@@ -205,7 +206,7 @@ pub trait Slave: Participant {
         Ok(None)
     }
 
-    /// Makes a state of bytes.
+    /// Deserialises a state.
     ///
     /// # Errors
     ///
@@ -214,8 +215,9 @@ pub trait Slave: Participant {
         Ok(None)
     }
 
-    /// The derivative of the real variable `unknown` in the direction `seed` of the real variable `known`, or, `adjoint`,
-    /// of `seed · unknown` by each element of `known`, into `derivatives`. False where it offers no such call.
+    /// Computes the derivative of the real variable `unknown` in the direction `seed` of the real variable
+    /// `known`. If `adjoint`, computes that of `seed · unknown` with respect to each element of `known`. The
+    /// result goes to `derivatives`. False if the FMU does not offer the call.
     ///
     /// # Errors
     ///
@@ -231,7 +233,7 @@ pub trait Slave: Participant {
     }
 }
 
-/// What an instance says of a run that succeeded: how many calls returned `warning`, or a warning in its log.
+/// The remark of an instance on a successful run: how many calls returned `warning`, or a warning in its log.
 pub(super) fn remark(warnings: u64, warning: &str, log: Vec<LogMessage>) -> Option<String> {
     if warnings > 0 {
         let last = log.last().map(|m| format!("; last: {m}")).unwrap_or_default();
@@ -240,7 +242,7 @@ pub(super) fn remark(warnings: u64, warning: &str, log: Vec<LogMessage>) -> Opti
     log.into_iter().rfind(|message| message.status.is_warning()).map(|message| message.text)
 }
 
-/// Passes calls on to what is inside.
+/// Passes calls on to the wrapped participant.
 macro_rules! calls {
     ($($method:ident($($argument:ident: $kind:ty),*);)*) => {$(
         fn $method(&mut self, $($argument: $kind),*) -> Result<(), Error> {
@@ -249,7 +251,7 @@ macro_rules! calls {
     )*};
 }
 
-/// All calls but `reset` and those by places.
+/// All calls except `reset` and those that use places.
 macro_rules! calls_of_a_run {
     () => {
         calls! {
@@ -293,7 +295,8 @@ impl Participant for Box<dyn Participant> {
     }
 }
 
-/// An instance of an FMU of others, made again for every run: what a reset forgets differs from FMU to FMU.
+/// An instance of an FMU of another program, instantiated again for every run, since FMUs differ in what a
+/// reset forgets.
 pub struct Fresh {
     fmu: Rc<Fmu>,
     description: Rc<Description>,

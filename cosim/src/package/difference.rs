@@ -1,5 +1,6 @@
-//! Differences in meaning between two model descriptions. Their writing does not count: comments, blanks between
-//! elements, the order of attributes, line ends. Nor does the time of writing, `generationDateAndTime`.
+//! Differences in meaning between two model descriptions. The form of the XML does not count: comments,
+//! blanks between elements, the order of attributes, line ends. Neither does the time of generation,
+//! `generationDateAndTime`.
 
 use roxmltree::{Attribute, Document, Node};
 
@@ -7,7 +8,7 @@ use roxmltree::{Attribute, Document, Node};
 const ROOT: &str = "fmiModelDescription";
 /// The attribute of the root in which two builds of the same model may differ.
 const TIME: &str = "generationDateAndTime";
-/// The most characters of a value that are shown.
+/// The most characters shown of a value.
 const SHOWN: usize = 60;
 
 /// A model description of FMI 2.0, parsed.
@@ -23,12 +24,12 @@ pub(super) fn parse(text: &str) -> Result<Document<'_>, String> {
     }
 }
 
-/// The differences of `here` from `there`: every attribute of the model that differs, with the GUID first. Where
-/// none does, the first difference in the content.
+/// The differences of `here` from `there`: all differing attributes of the model, with the GUID first. If
+/// none differ, the first difference in the content.
 pub(super) fn of(here: &Document<'_>, there: &Document<'_>) -> Option<String> {
     let (here, there) = (here.root_element(), there.root_element());
     let mut reported = attributes(here, there);
-    // With another GUID, the rest belongs to another model.
+    // If the GUID differs, the rest belongs to another model.
     reported.sort_by_key(|difference| !difference.starts_with("guid "));
     if reported.is_empty() { children(here, there) } else { Some(reported.join("; ")) }
 }
@@ -42,7 +43,7 @@ fn shown(value: Option<&str>) -> String {
     }
 }
 
-/// The attributes that differ, each with both values.
+/// The differing attributes, each with both values.
 fn attributes(here: Node<'_, '_>, there: Node<'_, '_>) -> Vec<String> {
     let of = |node: Node<'_, '_>, other: Attribute<'_, '_>| {
         let same = |a: &Attribute<'_, '_>| (a.namespace(), a.name()) == (other.namespace(), other.name());
@@ -51,7 +52,7 @@ fn attributes(here: Node<'_, '_>, there: Node<'_, '_>) -> Vec<String> {
     let all = |a: Attribute<'_, '_>, b: Attribute<'_, '_>| {
         (a.namespace(), a.name(), a.value()) == (b.namespace(), b.name(), b.value())
     };
-    // The usual case: all are equal in their order, and none has to be looked up.
+    // Usually all attributes are equal and in the same order, so that no lookup is needed.
     if here.attributes().len() == there.attributes().len()
         && here.attributes().zip(there.attributes()).all(|(a, b)| all(a, b))
     {
@@ -68,7 +69,7 @@ fn attributes(here: Node<'_, '_>, there: Node<'_, '_>) -> Vec<String> {
     here.attributes().chain(missing).filter_map(different).collect()
 }
 
-/// The first difference of two elements, or of their content.
+/// The first difference between two elements, or in their content.
 fn element(here: Node<'_, '_>, there: Node<'_, '_>) -> Option<String> {
     let place = || {
         let line = here.document().text_pos_at(here.range().start).row;

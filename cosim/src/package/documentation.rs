@@ -1,21 +1,21 @@
-//! `documentation/index.html` of an FMU: its purpose, its coupling, its variables.
+//! Writes `documentation/index.html` of an FMU: its purpose, its coupling, its variables.
 
 use punctual_fmu::configuration::{Configuration, FmiVersion, SamplingName};
 use punctual_fmu::product::Product;
 use punctual_modeldescription::{Real, Variable, VariableKind, fmi3};
 
-/// A variable for a human: name, causality, unit, start, range, meaning.
+/// A variable for the reader: name, causality, unit, start, range, meaning.
 pub(super) type Row = [String; 6];
 
-/// A model description as its file, and as rows of the page.
+/// A model description as the text of its file, and as rows of the page.
 pub(super) struct Described {
     pub(super) xml: String,
-    /// The file of the terminals, which FMI 3.0 alone has.
+    /// The file of the terminals, which only FMI 3.0 has.
     pub(super) terminals: Option<String>,
     pub(super) rows: Vec<Row>,
 }
 
-/// The range of a number, in words.
+/// The range of a number, as text.
 fn range(min: Option<f64>, max: Option<f64>) -> String {
     let text = |value: Option<f64>| value.map(shown).unwrap_or_default();
     match (min, max) {
@@ -41,7 +41,7 @@ pub(super) fn row(v: &Variable) -> Row {
     [v.name.clone(), v.causality.as_str().to_owned(), unit, start, range, v.description.clone()]
 }
 
-/// The row of a variable of FMI 3.0; an array has its sizes beside its name.
+/// The row of a variable of FMI 3.0; the sizes of an array follow its name.
 pub(super) fn row_of_fmi3(v: &fmi3::Variable) -> Row {
     let sizes: Vec<_> = v.dimensions.iter().filter_map(|d| Some(d.start?.to_string())).collect();
     let name = if sizes.is_empty() { v.name.clone() } else { format!("{}[{}]", v.name, sizes.join(",")) };
@@ -104,7 +104,7 @@ pub(super) fn page(product: &Product, described: &Described, canonical: &str) ->
     let step = experiment.step_size;
     let mut texts = format!("{use_of}{given}");
     if experiment.fmi == FmiVersion::Three && experiment.arrays {
-        // Arrays have the names that scalars begin with.
+        // An array is called by the part of the scalars' names before the dot.
         texts = texts.replace(".*</code>", "</code>");
     }
     format!(
@@ -154,7 +154,7 @@ const CONTROLLER: &str = "<p>Connect the measured state to <code>x.*</code> and 
 It promises nothing; that is what the filter is for. A state that is not finite gives <code>u_ref.*</code> that are not a \
 number, which the filter reports as <code>invalid_input</code>.</p>";
 
-/// A number with all its digits, with a power of ten where they are many.
+/// A number with all its digits, in exponent notation if there are many.
 fn shown(value: f64) -> String {
     let text = value.to_string();
     if text.len() > 20 { format!("{value:e}") } else { text }

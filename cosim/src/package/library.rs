@@ -1,4 +1,4 @@
-//! Finding the prebuilt shared library that every FMU contains.
+//! Finds the prebuilt shared library that every FMU contains.
 
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::path::{Path, PathBuf};
@@ -25,9 +25,9 @@ pub struct Library {
 }
 
 impl Library {
-    /// Its names in the archive of an FMU of the version `fmi`: one for each processor that it is for.
+    /// Its paths in the archive of an FMU of the version `fmi`, one for each processor that it supports.
     pub fn entries(&self, identifier: &str, fmi: FmiVersion) -> Vec<String> {
-        // Each platform that a file can be for has an ending.
+        // Every platform that a library can be for has a file extension.
         let ending = ending(Version::Fmi2, self.platform).unwrap_or(DLL_SUFFIX);
         let folders = match fmi {
             FmiVersion::Two => vec![self.platform],
@@ -37,13 +37,15 @@ impl Library {
     }
 }
 
-/// Reads the shared libraries of an FMU: those `given`, each for the platform that its file is for; where none is given the one
-/// that [`VARIABLE`] names, else the one beside this executable (an installed `punctual`), in its `deps/` folder (`cargo run`), or in
-/// `../lib/`. Of several in such places the newest is taken, which matters in a build folder only.
+/// Reads the shared libraries for an FMU. Each of those `given` is for the platform that its file says. If
+/// none is given, takes the one that [`VARIABLE`] names, else the one beside this executable (an installed
+/// `punctual`), in its `deps/` folder (`cargo run`), or in `../lib/`. If several of these places have one,
+/// the newest is taken, which only matters in a build folder.
 ///
 /// # Errors
 ///
-/// A file that cannot be read, or is no library of every FMU of this version; two for one platform; no library anywhere.
+/// A file that cannot be read, or is not the library for FMUs of this version; two for one platform; no
+/// library anywhere.
 pub fn read(given: &[PathBuf]) -> Result<Vec<Library>, Error> {
     let named = || std::env::var_os(VARIABLE).filter(|name| !name.is_empty()).map(PathBuf::from);
     let own = match (given, named()) {
@@ -56,7 +58,7 @@ pub fn read(given: &[PathBuf]) -> Result<Vec<Library>, Error> {
         let bytes = std::fs::read(path).map_err(|e| Error::io("read", path, e))?;
         let refused = |message: String| Error::configuration("library", message).in_file(path);
         let platform = symbols::platform(&bytes).map_err(refused)?;
-        // One for this platform shows what it is by being tried.
+        // A library for this platform is checked by running it; only others need the mark.
         if platform != PLATFORM && !bytes.windows(MARK.len()).any(|part| part == MARK.as_bytes()) {
             let message = format!("is not the library of \"{}\", which this program is", MARK.trim_end());
             return Err(refused(message));

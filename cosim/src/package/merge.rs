@@ -1,7 +1,7 @@
-//! FMUs of the same content, built on different systems, joined to one with the binaries of all.
+//! Merges FMUs of the same content that were built on different systems into one with the binaries of all.
 //!
-//! Each platform owns the folders `binaries/<platform>/` and `resources/<platform>/`, if it has one, where
-//! plug-ins lie. All else must be the same in every FMU: the bytes of each file, and the content of the model
+//! Each platform owns the folders `binaries/<platform>/` and, if present, `resources/<platform>/`, where
+//! plug-ins lie. Everything else must agree in all FMUs: the bytes of each file, and the content of the model
 //! description.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -16,7 +16,7 @@ use crate::error::{Error, FmuProblem};
 use crate::host::Archive;
 use crate::validate::{self, Report, Severity};
 
-/// The greatest size of the product unpacked, in bytes: it is put together in memory.
+/// The greatest unpacked size of the merged FMU, in bytes, since it is assembled in memory.
 pub const MAX_MERGED_BYTES: u64 = 1 << 30;
 
 const MODEL_DESCRIPTION: &str = "modelDescription.xml";
@@ -26,13 +26,13 @@ const MODEL_DESCRIPTION: &str = "modelDescription.xml";
 pub struct Merged {
     /// The model's name.
     pub model_name: String,
-    /// The GUID of all.
+    /// The GUID, which all share.
     pub guid: String,
-    /// The platforms, sorted, each with the file that its binaries are from.
+    /// The platforms, sorted, each with the file that its binaries come from.
     pub platforms: Vec<(String, PathBuf)>,
-    /// Folders without a file, which the product does not have.
+    /// Folders without files, which the merged FMU does not contain.
     pub left_out: Vec<String>,
-    /// Findings of `validate` on the product.
+    /// Findings of `validate` on the merged FMU.
     pub report: Report,
 }
 
@@ -67,7 +67,7 @@ impl Part {
         Ok(std::fs::metadata(&path).map_err(|e| Error::io("read", &path, e))?.len())
     }
 
-    /// Whether it was built by this program with a plug-in.
+    /// Whether this program built it with a plug-in.
     fn has_plugin(&self) -> bool {
         let text = self.read(&format!("resources/{RESOURCE}")).unwrap_or_default();
         String::from_utf8_lossy(&text).contains("\nplugin_digest = ")
@@ -82,22 +82,22 @@ fn broken(path: &Path) -> impl Fn(written::Error) -> Error {
     |e| Error::fmu(path, FmuProblem::Archive(e.to_string()))
 }
 
-/// The platform's folder that an entry is in, if it is in one.
+/// The platform's folder that contains an entry, if any.
 fn group<'a>(entry: &'a str, platforms: &BTreeSet<&str>) -> Option<Group<'a>> {
     let (root, rest) = entry.split_once('/')?;
     let (platform, _) = rest.split_once('/')?;
     (["binaries", "resources"].contains(&root) && platforms.contains(platform)).then_some((root, platform))
 }
 
-/// Joins the FMUs at `paths` and writes the product to `file`, which may be one of them. Then examines it as
-/// `validate` does. `limit` is the time of the trial, which is made where this system's platform is among those
-/// joined. `None` leaves it out, and nothing of an FMU is run. The order of `paths` changes no byte of the
-/// product.
+/// Merges the FMUs at `paths` and writes the result to `file`, which may be one of them. It is then examined
+/// as `validate` does. `limit` is the time limit of the trial, which takes place if this system's platform is
+/// among those merged. `None` skips the trial, and no code of an FMU is run. The order of `paths` does not
+/// affect the bytes of the result.
 ///
 /// # Errors
 ///
-/// A file that cannot be read or written; FMUs that differ in more than their platforms, or in one that
-/// both have; a product that does not work. `file` is then as before.
+/// A file that cannot be read or written; FMUs that differ in more than their platforms, or in a platform
+/// that both have; a result that does not work. `file` is then unchanged.
 pub fn merge(paths: &[PathBuf], file: &Path, limit: Option<Duration>) -> Result<Merged, Error> {
     // Open the FMUs.
     let parts = paths.iter().map(|path| Part::open(path)).collect::<Result<Vec<_>, _>>()?;
@@ -106,7 +106,7 @@ pub fn merge(paths: &[PathBuf], file: &Path, limit: Option<Duration>) -> Result<
     };
     let platforms: BTreeSet<&str> =
         parts.iter().flat_map(|part| part.archive.platforms()).map(String::as_str).collect();
-    // All but the platforms' folders is the same.
+    // Everything outside the platforms' folders agrees.
     let (model_name, guid) = compare_descriptions(first, others)?;
     if let Some(part) = parts.iter().find(|part| part.archive.platforms().is_empty()) {
         return Err(unfit(part.path(), "there is nothing in its binaries/"));
@@ -115,7 +115,7 @@ pub fn merge(paths: &[PathBuf], file: &Path, limit: Option<Duration>) -> Result<
         let common = |entry: &str| entry != MODEL_DESCRIPTION && group(entry, &platforms).is_none();
         compare(first, other, "", common)?;
     }
-    // Each platform's folders come from one FMU; others that have them have the same.
+    // Each platform's folders come from one FMU; all others that have them have the same ones.
     let mut owners: BTreeMap<Group<'_>, &Part> = BTreeMap::new();
     for part in &parts {
         let groups: BTreeSet<_> = part.files.iter().filter_map(|entry| group(entry, &platforms)).collect();
@@ -125,12 +125,12 @@ pub fn merge(paths: &[PathBuf], file: &Path, limit: Option<Duration>) -> Result<
             compare(owner, part, &context, |entry| group(entry, &platforms) == Some(own))?;
         }
     }
-    // The descriptions may be written in different ways, with the same meaning. The least is taken, whatever the
-    // order.
+    // The descriptions may differ in form with the same meaning. The least text is taken, so that the order
+    // does not matter.
     let descriptions =
         parts.iter().map(|part| part.read(MODEL_DESCRIPTION)).collect::<Result<Vec<_>, _>>()?;
     let description = descriptions.into_iter().min().unwrap_or_default();
-    // Put the product together, within the limit.
+    // Assemble the merged FMU, within the limit.
     let mut total = description.len() as u64;
     let mut product = written::Archive::new().with_timestamp(super::timestamp()?);
     product.add(MODEL_DESCRIPTION, description).map_err(broken(first.path()))?;
@@ -150,7 +150,7 @@ pub fn merge(paths: &[PathBuf], file: &Path, limit: Option<Duration>) -> Result<
             product.add(entry, part.read(entry)?).map_err(broken(part.path()))?;
         }
     }
-    // Examine the product, and tell what it lacks.
+    // Examine the result, and report the folders left out.
     let empty = |folder: &&String| {
         let all = parts.iter().flat_map(|part| &part.files);
         folder.ends_with('/') && !all.clone().any(|entry| entry.starts_with(folder.as_str()))
@@ -169,7 +169,7 @@ pub fn merge(paths: &[PathBuf], file: &Path, limit: Option<Duration>) -> Result<
     })
 }
 
-/// The name and GUID of all descriptions, if their contents agree.
+/// The common name and GUID of all descriptions, if their contents agree.
 fn compare_descriptions(first: &Part, others: &[Part]) -> Result<(String, String), Error> {
     let problem = |part: &Part, text| Error::fmu(part.path(), FmuProblem::Description(text));
     let there = difference::parse(&first.description).map_err(|e| problem(first, e))?;
@@ -191,7 +191,7 @@ fn compare_descriptions(first: &Part, others: &[Part]) -> Result<(String, String
     Ok((attribute("modelName"), attribute("guid")))
 }
 
-/// Refuses `other` where one of the files that `belong` differs from that in `first`.
+/// Refuses `other` if one of the files that `belong` differs from that in `first`.
 fn compare(first: &Part, other: &Part, context: &str, belong: impl Fn(&str) -> bool) -> Result<(), Error> {
     let name = first.path().display();
     let refuse = |text: String| Err(unfit(other.path(), format!("{context}{text}")));
@@ -216,7 +216,7 @@ fn compare(first: &Part, other: &Part, context: &str, belong: impl Fn(&str) -> b
     Ok(())
 }
 
-/// Writes the product beside `file`, examines it there, and puts it in the place of `file`.
+/// Writes the merged FMU beside `file`, examines it there, and moves it to `file`.
 fn write(product: &written::Archive, file: &Path, limit: Option<Duration>) -> Result<Report, Error> {
     let bytes = product.to_bytes().map_err(broken(file))?;
     let failed = |e| Error::io("write", file, e);
@@ -229,7 +229,7 @@ fn write(product: &written::Archive, file: &Path, limit: Option<Duration>) -> Re
         let (from, to) = (draft.display().to_string(), file.display().to_string());
         finding.message = finding.message.replace(&from, &to);
     }
-    // Other errors were there before. Only these rules can be broken by joining, or by this system's library.
+    // Other errors were there before. Only these rules can be broken by merging, or by this system's library.
     let rules = ["archive.readable", "archive.name", "archive.limit", "trial."];
     let fatal = report.findings.iter().find(|finding| {
         finding.severity == Severity::Error && rules.iter().any(|rule| finding.rule.starts_with(rule))

@@ -1,6 +1,6 @@
-//! From a configuration to an `.fmu` file: model description, library, resources, documentation and icon. Also
-//! from a system to an `.ssp` file, and from FMUs of several systems to one. No compiler is needed; the same
-//! configuration and library give the same bytes.
+//! Turns a configuration into an `.fmu` file: model description, library, resources, documentation and icon.
+//! Also turns a system into an `.ssp` file, and merges FMUs of several systems into one. No compiler is
+//! needed; the same configuration and library give the same bytes.
 
 mod difference;
 mod documentation;
@@ -22,7 +22,8 @@ use crate::host::{Fmu, PLATFORM};
 use crate::whole;
 use library::Library;
 
-/// The licences of what an FMU is made of. The texts are those of the repository; the place is that of FMI 3.0, for both versions.
+/// The licences of the contents of an FMU. The texts are those of the repository. FMI 3.0 prescribes the
+/// path, which both versions use.
 const LICENCE: (&str, &str) = (
     "documentation/licenses/license.txt",
     concat!(
@@ -50,7 +51,7 @@ pub fn read_configuration(path: &Path) -> Result<Configuration, Error> {
     plugin::read(path, &loader)
 }
 
-/// The error that an archive cannot be written.
+/// The error for an archive that cannot be written.
 fn broken(error: &punctual_modeldescription::Error) -> Error {
     Error::configuration("", error.to_string())
 }
@@ -63,7 +64,8 @@ fn timestamp() -> Result<Timestamp, Error> {
     }
 }
 
-/// The model description of `product` in its version of FMI, as the file and as rows for a human.
+/// The model description of `product` in its version of FMI, as the text of the file and as rows for the
+/// documentation.
 fn described(product: &Product) -> Result<documentation::Described, Error> {
     let broken = |e: punctual_modeldescription::Error| broken(&e);
     Ok(match product.configuration.experiment().fmi {
@@ -86,12 +88,12 @@ fn described(product: &Product) -> Result<documentation::Described, Error> {
     })
 }
 
-/// The entries of the FMU of `product` around its shared libraries. Entries carry the time of
-/// the environment variable `SOURCE_DATE_EPOCH` if it is set, else a fixed one.
+/// Assembles the FMU of `product` with its shared libraries. Entries carry the time in the environment
+/// variable `SOURCE_DATE_EPOCH` if it is set, else a fixed one.
 ///
 /// # Errors
 ///
-/// A `SOURCE_DATE_EPOCH` that is not a time a zip archive can hold; a plug-in that cannot be read.
+/// A `SOURCE_DATE_EPOCH` that a zip archive cannot represent; a plug-in that cannot be read.
 pub fn archive(product: &Product, libraries: Vec<Library>) -> Result<Archive, Error> {
     let broken = |e: punctual_modeldescription::Error| broken(&e);
     let timestamp = timestamp()?;
@@ -129,13 +131,13 @@ pub fn archive(product: &Product, libraries: Vec<Library>) -> Result<Archive, Er
     Ok(archive)
 }
 
-/// Writes the FMU of `configuration` with the [`libraries`](library::read) to `file`. Then it opens the file as an importer would: it
-/// reads the description, loads the library for this platform if there is one, makes an instance and initialises it. A product
-/// that does not work is removed again.
+/// Writes the FMU of `configuration` with the [`libraries`](library::read) to `file`. Then it opens the file
+/// as an importer would: it reads the description, loads the library for this platform if there is one, makes
+/// an instance and initialises it. An FMU that does not work is removed again.
 ///
 /// # Errors
 ///
-/// A file that cannot be written, a plug-in with libraries for other platforms, or a product that does not work.
+/// A file that cannot be written, a plug-in with libraries for other platforms, or an FMU that does not work.
 pub fn build(configuration: Configuration, libraries: &[PathBuf], file: &Path) -> Result<Rc<Fmu>, Error> {
     let product = Product::new(configuration)?;
     let libraries = library::read(libraries)?;
@@ -151,7 +153,7 @@ pub fn build(configuration: Configuration, libraries: &[PathBuf], file: &Path) -
     whole::write(file, archive(&product, libraries)?.to_bytes().map_err(|e| broken(&e))?)?;
     let opened = if can_run { tried(&product, file) } else { Fmu::open(file).map(Rc::new) };
     opened.inspect_err(|_| {
-        // If this fails too, the first error is the one to tell.
+        // If this fails too, the first error is the one to report.
         let _ = std::fs::remove_file(file);
     })
 }

@@ -1,4 +1,4 @@
-//! Plug-ins of configurations. A child process, where they may crash, tries them before this one loads them.
+//! Plug-ins of configurations. A child process, which may crash, tries them before this one loads them.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -11,17 +11,17 @@ use crate::host::journal;
 use crate::isolation::{self, Child, End, Voice};
 use crate::text;
 
-/// The hidden command of the child.
+/// The hidden command that the child runs.
 pub const COMMAND: &str = "try-plugin";
 
-/// Most time that a plug-in may take.
+/// Time limit for the trial of a plug-in.
 const LIMIT: Duration = Duration::from_secs(20);
 
 fn folder(configuration: &Path) -> PathBuf {
     configuration.parent().unwrap_or(Path::new("")).to_owned()
 }
 
-/// The plug-ins beside a configuration file.
+/// Loads plug-ins from the folder of a configuration file after trying them in a child process.
 pub(super) struct Tried<'a> {
     configuration: &'a Path,
     folder: PluginFolder,
@@ -44,7 +44,7 @@ impl PluginLoader for Tried<'_> {
             let words = [COMMAND.into(), "--".into(), self.configuration.into(), child.folder().into()];
             child.run(words, Voice::Silent, Some(LIMIT))
         };
-        // A plug-in that the child refuses is refused here with the same words.
+        // If the child refuses a plug-in, it is refused here with the same message.
         if let End::Broken { how, last } = tried().map_err(|e| e.to_string())? {
             let place = last.map_or_else(String::new, |last| format!(" in {}", last.call));
             let file = plugin_file_name(name);
@@ -54,13 +54,13 @@ impl PluginLoader for Tried<'_> {
     }
 }
 
-/// Reads the configuration at `path` with plug-ins that `loader` finds.
+/// Reads the configuration at `path` with the plug-ins that `loader` loads.
 pub(super) fn read(path: &Path, loader: &dyn PluginLoader) -> Result<Configuration, Error> {
     let text = text::read(path)?;
     Configuration::parse_with(&text, loader).map_err(|e| Error::from(e).in_file(path))
 }
 
-/// Reads, in the child, the configuration at `path` with its plug-in, and unloads that again.
+/// Runs in the child: reads the configuration at `path` with its plug-in, and unloads the plug-in again.
 ///
 /// # Errors
 ///

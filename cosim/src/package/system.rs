@@ -1,6 +1,7 @@
-//! From a system file to an `.ssp` package: its FMUs, connections and start values as System Structure and
-//! Parameterization 1.0 or 2.0, for other masters. Arrays are for 2.0, and are connected and set as a whole there. So are
-//! numbers of other types than a double and an integer of 32 bits. Nothing is run; the same files give the same bytes.
+//! Turns a system file into an `.ssp` package for other masters: its FMUs, connections and start values in
+//! System Structure and Parameterization 1.0 or 2.0. Only 2.0 has arrays, which are connected and set as a
+//! whole, and numbers of types other than double and 32-bit integer. Nothing is run; the same files give the
+//! same bytes.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -21,29 +22,29 @@ use crate::whole;
 /// The parameter set with the start values, in the archive.
 const START_VALUES: &str = "resources/start_values.ssv";
 
-/// Numbers of a package.
+/// Counts and notes for a package.
 #[derive(Clone, Debug)]
 pub struct Packed {
     /// Number of components.
     pub components: usize,
     /// Number of FMU files; components can share one.
     pub fmus: usize,
-    /// Number of connections, those by name included.
+    /// Number of connections, including those by name.
     pub connections: usize,
     /// Number of start values.
     pub start_values: usize,
-    /// What the user has to know of configurations that were built, by file.
+    /// Warnings on configurations that were built, by file.
     pub warnings: Vec<String>,
     /// Notes on the units of connections.
     pub notes: Vec<String>,
 }
 
-/// Writes the package of the system at `path` to `file`, in this version of SSP.
+/// Packs the system at `path` into `file`, in this version of SSP.
 ///
 /// # Errors
 ///
-/// A system file that cannot be used, an FMU that is not there or cannot be used, an array that the version has no
-/// place for, a file that cannot be written.
+/// A system file that cannot be used, an FMU that is missing or cannot be used, an array that the version
+/// cannot represent, a file that cannot be written.
 pub fn pack(path: &Path, file: &Path, version: SspVersion) -> Result<Packed, Error> {
     let system = System::read(path)?;
     let base = path.parent().unwrap_or(Path::new(""));
@@ -57,7 +58,7 @@ pub fn pack(path: &Path, file: &Path, version: SspVersion) -> Result<Packed, Err
 /// An FMU and the bytes of its file.
 type Opened = (Rc<Fmu>, Vec<u8>);
 
-/// The FMU at `path`, or the one that the configuration there becomes, and its bytes; what the user has to know of the
+/// The FMU at `path`, or the one built from the configuration there, and its bytes; also a warning on the
 /// configuration.
 fn fmu(path: &Path) -> Result<(Opened, Option<String>), Error> {
     let read = |file: &Path| std::fs::read(file).map_err(|e| Error::io("read", file, e));
@@ -73,11 +74,11 @@ fn fmu(path: &Path) -> Result<(Opened, Option<String>), Error> {
 
 /// The FMUs of a system, each file once.
 struct Store {
-    /// The FMUs, each with its place in the archive and its bytes.
+    /// The FMUs, each with its path in the archive and its bytes.
     fmus: Vec<(Rc<Fmu>, String, Vec<u8>)>,
     /// The index of the FMU of each component.
     of_component: Vec<usize>,
-    /// What the user has to know of configurations, by file.
+    /// Warnings on configurations, by file.
     warnings: Vec<String>,
 }
 
@@ -111,7 +112,7 @@ impl Store {
         Ok(store)
     }
 
-    /// A place in the archive that no other FMU has, with a name that is also a URI.
+    /// A unique path in the archive, which is also a valid URI.
     fn place(&self, path: &Path) -> String {
         let stem = path.file_stem().map(|stem| stem.to_string_lossy()).unwrap_or_default();
         let plain = |c: char| if c.is_ascii_alphanumeric() || "._-".contains(c) { c } else { '_' };
@@ -154,15 +155,15 @@ fn archive(
     let components = system.components().iter().zip(&descriptions).enumerate();
     let components = components
         .map(|(c, (component, description))| {
-            // An array counts by its first element; SSP 1.0 shows none.
+            // An array is represented by its first element; SSP 1.0 has no arrays.
             let shown = |v: &usize| {
                 let variable = &description.variables[*v];
                 let array = array_of(description, *v);
                 if array.is_some_and(|array| version == SspVersion::One || *v != array.first) {
                     return false;
                 }
-                // An input that is neither connected nor set keeps the start value of its FMU, so it is no
-                // connector. Some masters write zero to every input that is one.
+                // An input that is neither connected nor set keeps the start value of its FMU, so it gets no
+                // connector. Some masters write zero to every input that has one.
                 let name =
                     format!("{}.{}", component.name, array.map_or(&variable.name, |array| &array.name));
                 let port = Port { component: c, variable: *v };
@@ -228,7 +229,7 @@ fn array_of(description: &Description, variable: usize) -> Option<&Array> {
     description.arrays.iter().find(|array| (array.first..array.first + array.count).contains(&variable))
 }
 
-/// SSP connects outputs to inputs of the same type only.
+/// Refuses other connections: SSP connects outputs only to inputs of the same type.
 fn refuse_others(system: &System, descriptions: &[&Description], links: &[Link]) -> Result<(), Error> {
     for link in links {
         let variable = |port: Port| &descriptions[port.component].variables[port.variable];
@@ -250,7 +251,7 @@ fn refuse_others(system: &System, descriptions: &[&Description], links: &[Link])
     Ok(())
 }
 
-/// SSP 1.0 knows no arrays, so none can be connected or given a value.
+/// Refuses arrays that are connected or set: SSP 1.0 has none.
 fn refuse_arrays(system: &System, descriptions: &[&Description], links: &[Link]) -> Result<(), Error> {
     for (c, (component, description)) in system.components().iter().zip(descriptions).enumerate() {
         let given: Vec<usize> =
@@ -271,12 +272,12 @@ fn refuse_arrays(system: &System, descriptions: &[&Description], links: &[Link])
     Ok(())
 }
 
-/// The connections, of arrays as a whole.
+/// The connections, with arrays as a whole.
 ///
 /// # Errors
 ///
-/// An array of which only some elements are connected, or with other elements than their own. SSP 2.0 has indices for
-/// that (`startIndices`), which are not written.
+/// An array that is connected only in part, or whose elements are connected in another order. SSP 2.0 has
+/// indices for that (`startIndices`), which are not written.
 fn connections(
     system: &System,
     descriptions: &[&Description],
@@ -323,8 +324,8 @@ fn in_parts(from: &(String, String), to: &(String, String)) -> Error {
     Error::configuration("connect", message)
 }
 
-/// The enumerations of all components, each once. Where two share a name but not the items, the later one is
-/// named after its component too.
+/// The enumerations of all components, each once. If two share a name but not the items, the later one gets
+/// its component's name as well.
 #[derive(Default)]
 struct Enumerations(Vec<SimpleType>);
 
@@ -343,7 +344,7 @@ impl Enumerations {
     }
 }
 
-/// The connector of a variable, or of the array that it is the first element of, if there can be one.
+/// The connector of a variable, or of the array whose first element it is, if possible.
 fn connector(
     component: &str,
     description: &Description,
@@ -378,8 +379,8 @@ fn connector(
     Some(Connector { name, causality: variable.causality, kind, number, dimensions })
 }
 
-/// The type of a number, where Real or Integer is another and the version has it. An enumeration whose items the
-/// format cannot hold is what it is in FMI 3.0.
+/// The type of a number if neither Real nor Integer represents it and the version has the type. An
+/// enumeration whose items the format cannot represent keeps its type of FMI 3.0.
 fn number(variable: &Variable, version: SspVersion) -> Option<DataType> {
     match (version, variable.of) {
         (SspVersion::One, _) | (_, DataType::Float64 | DataType::Int32) => None,
@@ -388,7 +389,7 @@ fn number(variable: &Variable, version: SspVersion) -> Option<DataType> {
     }
 }
 
-/// The items of an enumeration, if the format can hold all of them. It has no place for their meaning.
+/// The items of an enumeration, if the format can represent all of them. Their descriptions are lost.
 fn items(variable: &Variable) -> Option<Vec<EnumerationItem>> {
     let item = |(name, value): &(String, i64)| {
         let value = i32::try_from(*value).ok()?;
@@ -398,7 +399,7 @@ fn items(variable: &Variable) -> Option<Vec<EnumerationItem>> {
     items.filter(|items| !items.is_empty())
 }
 
-/// The position of a variable, or of the first element of an array, by its name.
+/// The position of the variable, or of the first element of the array, with this name.
 fn first_of(description: &Description, name: &str) -> Option<usize> {
     description.index_of(name).or_else(|| Some(description.array(name)?.first))
 }
@@ -407,7 +408,8 @@ fn first_of(description: &Description, name: &str) -> Option<usize> {
 ///
 /// # Errors
 ///
-/// A whole number that the version cannot hold, an element of an array, an array of texts or enumerations.
+/// A whole number that the version cannot represent, a single element of an array, an array of texts or
+/// enumerations.
 fn start_values(
     system: &System,
     descriptions: &[&Description],
@@ -457,7 +459,7 @@ fn start_values(
     Ok(values)
 }
 
-/// The value of an array of numbers or truth values.
+/// The value of an array of numbers or Booleans.
 fn list(values: &[ParameterValue]) -> Option<ParameterValue> {
     use ParameterValue::{Boolean, Booleans, Integer, Integers, Real, Reals};
     let reals = values.iter().map(|value| if let Real(x) = value { Some(*x) } else { None });
@@ -468,7 +470,7 @@ fn list(values: &[ParameterValue]) -> Option<ParameterValue> {
         .or_else(|| booleans.collect::<Option<_>>().map(Booleans))
 }
 
-/// The value of a variable in the format; `None` where it has no place for it.
+/// The value of a variable in the format; `None` if it cannot represent it.
 fn parameter(variable: &Variable, value: &StartValue, version: SspVersion) -> Option<ParameterValue> {
     Some(match value {
         StartValue::Real(x) => ParameterValue::Real(*x),
@@ -477,7 +479,7 @@ fn parameter(variable: &Variable, value: &StartValue, version: SspVersion) -> Op
         StartValue::Integer(i) if variable.family() == Family::Real => ParameterValue::Real(*i as f64),
         StartValue::Integer(i) => match variable.items.iter().find(|(_, item)| item == i) {
             Some((name, _)) if items(variable).is_some() => ParameterValue::Enumeration(name.clone()),
-            // A UInt32 has a type of its own in SSP 2.0 only.
+            // Only SSP 2.0 has a type for a UInt32.
             _ if version == SspVersion::One && i32::try_from(*i).is_err() => return None,
             _ => ParameterValue::Integer(*i),
         },

@@ -1,5 +1,5 @@
-//! The files of FMI 3.0 beside the description: terminals, and how source code is built (FMI 3.0.2, sections 2.4.9
-//! and 2.4.10).
+//! Checks the files of FMI 3.0 beside the description: terminals, and the build description of source code
+//! (FMI 3.0.2, sections 2.4.9 and 2.4.10).
 
 use punctual_modeldescription::fmi3::{LocatedTerminals, ModelDescription, TERMINALS};
 use punctual_modeldescription::{brief, is_c_identifier};
@@ -11,10 +11,10 @@ use super::schema::{self, Schema};
 use crate::error::FmuProblem;
 use crate::host::Archive;
 
-/// The path of the file that says how source code is built.
+/// The path of the build description of source code.
 pub(super) const BUILD: &str = "sources/buildDescription.xml";
 
-/// Checks both files, where they are there.
+/// Checks both files, if present.
 pub(super) fn check(archive: &Archive, description: &ModelDescription, findings: &mut Findings) {
     read(archive, TERMINALS, &schema::TERMINALS, findings, |document, findings| {
         let terminals = LocatedTerminals::read(document);
@@ -55,7 +55,7 @@ fn read(
     }
 }
 
-/// Checks that a build description names what is there.
+/// Checks that the files named in a build description exist.
 fn build(
     document: &Document<'_>,
     archive: &Archive,

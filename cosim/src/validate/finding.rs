@@ -1,4 +1,4 @@
-//! Findings: severity, rule, place, words.
+//! Findings, each with a severity, a rule, a place and a message.
 
 use std::fmt;
 
@@ -12,7 +12,7 @@ pub struct Place {
     pub file: String,
     /// The line, from 1, and the column, from 1, in bytes.
     pub position: Option<(u32, u32)>,
-    /// The variable, where the finding is about one.
+    /// The variable, if the finding is about one.
     pub variable: Option<String>,
 }
 
@@ -57,10 +57,10 @@ impl fmt::Display for Finding {
 
 use Severity::{Error, Warning};
 
-/// A rule: its name, the severity of breaking it, and its demand.
+/// A rule: its name, the severity of breaking it, and what it requires.
 type Rule = (&'static str, Severity, &'static str);
 
-/// The rules on the archive and the schema, before the description's meaning.
+/// The rules on the archive and the schema, which come before those on the description's meaning.
 const BEFORE: &[Rule] = &[
     (
         "archive.readable",
@@ -133,51 +133,52 @@ const AFTER: &[Rule] = &[
     ("trial.instances", Warning, "there can be two instances, unless the description says otherwise"),
 ];
 
-/// Every rule: its name, the severity of breaking it, and its demand. A rule's name never changes its meaning.
+/// Every rule: its name, the severity of breaking it, and what it requires. The name of a rule never changes
+/// its meaning.
 pub fn rules() -> impl Iterator<Item = &'static (&'static str, Severity, &'static str)> {
     BEFORE.iter().chain(description::RULES).chain(AFTER)
 }
 
-/// The severity of breaking a rule. A rule that is not among [`rules`] counts as an error.
+/// The severity of breaking a rule. An unknown rule counts as an error.
 pub(super) fn severity(rule: &str) -> Severity {
     rules().find(|known| known.0 == rule).map_or(Error, |known| known.1)
 }
 
-/// Most findings kept of one rule: the thousandth variable without a start value teaches nothing.
+/// The most findings kept for one rule: the thousandth variable without a start value adds nothing.
 const KEPT_OF_A_RULE: usize = 20;
 
-/// A place in the file that is read.
+/// A place in the current file.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Mark {
-    /// Bytes from the beginning of the text.
+    /// Offset from the beginning of the text, in bytes.
     pub(super) at: usize,
-    /// The variable, where it is about one.
+    /// The variable, if the finding is about one.
     pub(super) variable: Option<String>,
 }
 
 /// The entry with the model description.
 pub(super) const DESCRIPTION: &str = "modelDescription.xml";
 
-/// Findings while they are collected.
+/// Collects findings.
 #[derive(Debug, Default)]
 pub(super) struct Findings {
-    /// The entry that is read, in which there are marks.
+    /// The current entry, which marks refer to.
     file: String,
-    /// The beginnings of its lines, in bytes.
+    /// The offsets of its lines, in bytes.
     lines: Vec<usize>,
     list: Vec<Finding>,
     left_out: Vec<(String, usize)>,
 }
 
 impl Findings {
-    /// Takes the text of an entry, in which there are marks from now on.
+    /// Makes this entry the current one, which marks refer to from now on.
     pub(super) fn read(&mut self, file: &str, text: &str) {
         file.clone_into(&mut self.file);
         let breaks = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n');
         self.lines = std::iter::once(0).chain(breaks.map(|(at, _)| at + 1)).collect();
     }
 
-    /// Adds a finding of a rule in the entry that is read.
+    /// Adds a finding in the current entry.
     pub(super) fn add(&mut self, rule: &str, mark: Mark, message: impl Into<String>) {
         let line = self.lines.partition_point(|begin| *begin <= mark.at);
         let begin = self.lines.get(line.saturating_sub(1)).copied().unwrap_or(0);
@@ -187,7 +188,7 @@ impl Findings {
         self.place(rule, Place { file, position, variable: mark.variable }, message);
     }
 
-    /// Adds a finding of a rule.
+    /// Adds a finding at a place.
     pub(super) fn place(&mut self, rule: &str, place: Place, message: impl Into<String>) {
         let severity = severity(rule);
         self.push(Finding { severity, rule: rule.to_owned(), place, message: message.into() });
@@ -198,7 +199,7 @@ impl Findings {
         self.place(rule, Place { file: entry.to_owned(), ..Place::default() }, message);
     }
 
-    /// Adds a finding as it is.
+    /// Adds a finding unchanged.
     pub(super) fn push(&mut self, finding: Finding) {
         if self.list.iter().filter(|other| other.rule == finding.rule).count() < KEPT_OF_A_RULE {
             self.list.push(finding);
@@ -210,19 +211,20 @@ impl Findings {
         }
     }
 
-    /// Whether a rule is broken whose name begins with `head`.
+    /// Whether some rule whose name begins with `head` is broken.
     pub(super) fn any(&self, head: &str) -> bool {
         self.any_in(head, |_| true)
     }
 
-    /// Whether such a rule is broken in an entry that `is_meant`; the archive as a whole has none.
+    /// Whether such a rule is broken in an entry that `is_meant`. Findings on the archive as a whole do not
+    /// count.
     pub(super) fn any_in(&self, head: &str, is_meant: impl Fn(&str) -> bool) -> bool {
         let is_broken =
             |f: &Finding| f.severity == Error && f.rule.starts_with(head) && is_meant(&f.place.file);
         self.list.iter().any(is_broken)
     }
 
-    /// All findings. Where some were left out, the last of their rule says how many.
+    /// All findings. If some were left out, the last one of their rule says how many.
     pub(super) fn finish(mut self) -> Vec<Finding> {
         for (rule, count) in self.left_out {
             if let Some(last) = self.list.iter_mut().rev().find(|finding| finding.rule == rule) {

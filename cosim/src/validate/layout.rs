@@ -28,7 +28,8 @@ const TOP_OF_FMI3: [&str; 7] = [
     "extra",
 ];
 
-/// The ending of libraries in a folder of `binaries/` of FMI 2.0, by the beginning of its name.
+/// The file extension of libraries in a folder of `binaries/` in FMI 2.0, by the beginning of the folder's
+/// name.
 const ENDINGS: [(&str, &str); 5] = [
     ("win", ".dll"),
     ("aarch64-windows", ".dll"),
@@ -37,14 +38,14 @@ const ENDINGS: [(&str, &str); 5] = [
     ("darwin", ".dylib"),
 ];
 
-/// The same for FMI 3.0, by the system in its name.
+/// The same for FMI 3.0, by the system in the name.
 const ENDINGS_OF_FMI3: [(&str, &str); 3] = [("windows", ".dll"), ("linux", ".so"), ("darwin", ".dylib")];
 
 /// The processors in names of folders of FMI 3.0.
 const ARCHITECTURES: [&str; 4] = ["aarch32", "aarch64", "x86", "x86_64"];
 
-/// What must be there beside others in FMI 3.0: the rule, a path or the beginning of one, and the entries of which one is
-/// needed.
+/// Companion files that entries of FMI 3.0 require: the rule, a path or a prefix of one, and the entries of
+/// which one is required.
 const COMPANIONS: [(&str, &str, &[&str]); 5] = [
     (
         "archive.companion",
@@ -58,11 +59,11 @@ const COMPANIONS: [(&str, &str, &[&str]); 5] = [
     ("archive.companion", "documentation/diagram.svg", &["documentation/diagram.png"]),
     ("archive.companion", "terminalsAndIcons/icon.svg", &["terminalsAndIcons/icon.png"]),
     ("archive.index", "documentation/", &["documentation/index.html"]),
-    // Tools put sources beside their libraries to be read, not built.
+    // Tools put sources beside their libraries for reading, not for building.
     ("archive.index", "sources/", &[BUILD]),
 ];
 
-/// The ending of libraries for a platform, where it is one that the standard names.
+/// The file extension of libraries for a platform, if the standard names the platform.
 pub(crate) fn ending(version: Version, platform: &str) -> Option<&'static str> {
     match version {
         Version::Fmi2 => {
@@ -121,7 +122,7 @@ pub(super) fn check(archive: &Archive, model: &Model, findings: &mut Findings) {
             findings.archive("archive.binary", &folder, message);
         }
     }
-    // Something to run, and a library for this platform.
+    // At least one library or sources, and a library for this platform.
     let own = version.platform();
     let is_source = |entry: &String| match version {
         Version::Fmi2 => entry.starts_with("sources/") && !entry.ends_with('/'),
@@ -143,7 +144,7 @@ pub(super) fn check(archive: &Archive, model: &Model, findings: &mut Findings) {
     }
 }
 
-/// Checks what must be there beside other entries.
+/// Checks the companion files that other entries require.
 fn companions(archive: &Archive, findings: &mut Findings) {
     let entries = archive.entries();
     for (rule, given, needed) in COMPANIONS {

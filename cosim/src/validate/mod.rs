@@ -1,5 +1,5 @@
-//! Defects of an FMU of FMI 2.0 co-simulation or of FMI 3.0, ours or another's, as a list of findings. Each module asks
-//! one kind of question and uses only those above it:
+//! Finds defects of an FMU, ours or another's: FMI 2.0 co-simulation or FMI 3.0. Each module checks one
+//! aspect and uses only those above it:
 //!
 //! | module | asks |
 //! |---|---|
@@ -11,8 +11,8 @@
 //! | `symbols` | whether the libraries export what they must, without loading them |
 //! | `trial` | whether an instance does what it should, in a child process |
 //!
-//! The rules of the standard on a description beyond the schema are those of `punctual_modeldescription`, for the
-//! same model as where a description is written.
+//! The rules of the standard on a description beyond the schema are those of `punctual_modeldescription`,
+//! checked on the same model that descriptions are written from.
 
 mod companions;
 mod finding;
@@ -36,26 +36,26 @@ use model::Model;
 /// Findings on one FMU.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
-    /// All findings: those of the archive first, then of the description from top to bottom.
+    /// All findings: first those on the archive, then those on the description from top to bottom.
     pub findings: Vec<Finding>,
     /// Checks that were not made, each with the reason.
     pub skipped: Vec<String>,
 }
 
 impl Report {
-    /// The number of findings of this severity.
+    /// The number of findings with this severity.
     pub fn count(&self, severity: Severity) -> usize {
         self.findings.iter().filter(|finding| finding.severity == severity).count()
     }
 }
 
-/// Examines the FMU at `path`. `limit` is the time of the trial; `None` leaves it out, and nothing of the FMU is
-/// run.
+/// Examines the FMU at `path`. `limit` is the time limit of the trial; `None` skips it, and no code of the
+/// FMU is run.
 ///
 /// # Errors
 ///
-/// The file cannot be read, it is of another version of FMI, or the trial's process cannot be started. Any defect of
-/// the FMU is a finding.
+/// The file cannot be read, the FMU is of another version of FMI, or the trial's process cannot be started.
+/// Every defect of the FMU is a finding.
 pub fn validate(path: &Path, limit: Option<Duration>) -> Result<Report, Error> {
     let mut findings = Findings::default();
     let mut skipped = Vec::new();
@@ -107,7 +107,7 @@ pub fn validate(path: &Path, limit: Option<Duration>) -> Result<Report, Error> {
     Ok(Report { findings: findings.finish(), skipped })
 }
 
-/// The rule that is broken by an FMU which cannot be opened at all.
+/// The rule broken by an FMU that cannot be opened at all.
 fn rule(problem: &FmuProblem) -> &'static str {
     match problem {
         FmuProblem::UnsafeEntry(_) => "archive.name",

@@ -1,4 +1,4 @@
-//! The model description of either version, as the other modules ask for it.
+//! The model description of either version, with the queries of the other modules.
 
 use punctual_modeldescription::{self as description, Located, Violation, brief, fmi3, is_c_identifier};
 use roxmltree::Document;
@@ -7,7 +7,7 @@ use super::finding::{Findings, Mark};
 use super::schema::{self, Schema};
 use crate::host::Version;
 
-/// A model description that was read.
+/// A model description.
 pub(super) enum Model {
     /// Of FMI 2.0.
     Fmi2(Box<Located>),
@@ -16,7 +16,7 @@ pub(super) enum Model {
 }
 
 impl Model {
-    /// Reads a document. What does not say that it is of FMI 3 counts as of FMI 2.0.
+    /// Reads a document. If it does not declare FMI 3, it counts as FMI 2.0.
     pub(super) fn read(document: &Document<'_>) -> Self {
         let version = document.root_element().attribute("fmiVersion").unwrap_or_default();
         if version.starts_with('3') {
@@ -42,7 +42,7 @@ impl Model {
         }
     }
 
-    /// Tells every rule on the description that is broken.
+    /// Reports every broken rule on the description.
     pub(super) fn check(&self, findings: &mut Findings) {
         match self {
             Self::Fmi2(model) => model.check(&mut |violation| {
@@ -62,14 +62,14 @@ impl Model {
         }
     }
 
-    /// The names of its libraries, each once.
+    /// The names of its libraries, without duplicates.
     pub(super) fn identifiers(&self) -> Vec<&str> {
         match self {
             Self::Fmi2(model) => {
                 let exchange =
                     model.description.model_exchange.as_ref().map(|of| of.model_identifier.as_str());
                 let mut names: Vec<&str> = model.model_identifier().into_iter().collect();
-                // What is no identifier is reported as such.
+                // Invalid identifiers are reported elsewhere.
                 names.extend(exchange.filter(|name| is_c_identifier(name) && !names.contains(name)));
                 names
             }
@@ -77,7 +77,7 @@ impl Model {
                 let mut names: Vec<&str> = Vec::new();
                 for (_, interface) in model.description.interfaces() {
                     let name = interface.model_identifier.as_str();
-                    // What is no identifier is reported as such.
+                    // Invalid identifiers are reported elsewhere.
                     if is_c_identifier(name) && !names.contains(&name) {
                         names.push(name);
                     }
@@ -105,7 +105,7 @@ impl Model {
         }
     }
 
-    /// Whether the description names source code. In FMI 3.0 another file does.
+    /// Whether the description names source code. In FMI 3.0 another file does so.
     pub(super) fn names_sources(&self) -> bool {
         match self {
             Self::Fmi2(model) => {
@@ -117,7 +117,7 @@ impl Model {
     }
 }
 
-/// The place of a violation, with the name of the variable that it is about.
+/// The place of a violation, with the name of its variable.
 pub(super) fn mark<'a>(
     violation: &Violation,
     at: usize,

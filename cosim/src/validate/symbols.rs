@@ -1,5 +1,5 @@
-//! Checks that libraries export the functions that the interfaces of FMI 2.0 need, or all of FMI 3.0. It reads their files,
-//! so that nothing of them runs, and those of other platforms can be checked too.
+//! Checks that libraries export the functions that the interfaces of FMI 2.0 need, or all functions of FMI
+//! 3.0. It only reads their files and runs no code, so it can also check those of other platforms.
 
 use std::collections::HashSet;
 
@@ -12,7 +12,7 @@ use super::layout::ending;
 use super::model::Model;
 use crate::host::Archive;
 
-/// The greatest library looked into, in bytes.
+/// The greatest size of a library that is examined, in bytes.
 const MAX_LIBRARY_BYTES: u64 = 512 << 20;
 
 /// The processors of libraries for a platform.
@@ -27,7 +27,7 @@ const PROCESSORS: [(&str, &[Architecture]); 8] = [
     ("darwin32", &[Architecture::I386]),
 ];
 
-/// The same by the names that FMI 3.0 adds.
+/// The same for the platform names that FMI 3.0 adds.
 const PROCESSORS_OF_FMI3: [(&str, &[Architecture]); 7] = [
     ("x86_64-linux", &[Architecture::X86_64]),
     ("x86-linux", &[Architecture::I386]),
@@ -38,7 +38,7 @@ const PROCESSORS_OF_FMI3: [(&str, &[Architecture]); 7] = [
     ("aarch64-darwin", &[Architecture::Aarch64]),
 ];
 
-/// Functions that a library must export, and what they are those of.
+/// Functions that a library must export, and the interface that they belong to.
 type Wanted = (&'static [&'static str], &'static str);
 
 /// The functions that model exchange adds in FMI 2.0.
@@ -70,7 +70,7 @@ fn functions(model: &Model, identifier: &str) -> Vec<Wanted> {
     }
 }
 
-/// The format of libraries for a platform, which may be one that the standard does not name.
+/// The library format of a platform, which may be one that the standard does not name.
 fn format(platform: &str) -> BinaryFormat {
     match platform {
         p if p.starts_with("win") || p.ends_with("-windows") => BinaryFormat::Pe,
@@ -129,7 +129,7 @@ fn library(archive: &Archive, wanted: &[Wanted], platform: &str, entry: &str, fi
     }
 }
 
-/// The names that a library exports, if it is one for the platform; else its defect.
+/// The names that a library exports, if it is one for the platform; otherwise its defect.
 fn exports(bytes: &[u8], platform: &str) -> Result<HashSet<String>, String> {
     if is_fat(bytes) && is_darwin(platform) {
         return fat_exports(bytes);
@@ -147,11 +147,12 @@ fn exports(bytes: &[u8], platform: &str) -> Result<HashSet<String>, String> {
     names(&file)
 }
 
-/// The platform of a shared library with every function of FMI 2.0 co-simulation, by its file: nothing of it runs.
+/// The platform of a shared library that exports every function of FMI 2.0 co-simulation. The file is read
+/// and not run.
 ///
 /// # Errors
 ///
-/// What it is instead.
+/// What the file is instead.
 pub(crate) fn platform(bytes: &[u8]) -> Result<&'static str, String> {
     let name = if is_fat(bytes) {
         "darwin64"
@@ -174,8 +175,8 @@ pub(crate) fn platform(bytes: &[u8]) -> Result<&'static str, String> {
     }
 }
 
-/// The folders of FMI 3.0 (3.0.2, section 2.5.1) for a library of the platform that FMI 2.0 calls `platform`: of a library
-/// for macOS one for each of its processors.
+/// The folders of FMI 3.0 (3.0.2, section 2.5.1) for a library whose platform is `platform` in FMI 2.0. A
+/// library for macOS has one folder for each of its processors.
 pub(crate) fn tuples(platform: &'static str, bytes: &[u8]) -> Vec<&'static str> {
     const INTEL: &str = "x86_64-darwin";
     const ARM: &str = "aarch64-darwin";
@@ -204,7 +205,7 @@ fn names(file: &object::File<'_>) -> Result<HashSet<String>, String> {
         if file.format() == BinaryFormat::MachO { name.trim_start_matches('_').to_owned() } else { name }
     };
     if file.format() == BinaryFormat::Elf {
-        // A loader finds only these.
+        // A loader only finds these.
         let defined = file.dynamic_symbols().filter(|symbol| symbol.is_definition() && symbol.is_global());
         return Ok(defined.filter_map(|symbol| symbol.name_bytes().ok().map(text)).collect());
     }
@@ -212,7 +213,7 @@ fn names(file: &object::File<'_>) -> Result<HashSet<String>, String> {
     let exports = file.exports().map_err(damaged)?;
     let mut names = HashSet::new();
     for export in exports {
-        // An export without a name cannot be asked for by one.
+        // An export without a name cannot be looked up by name.
         if let NameOrOrdinal::Name(name) = export.map_err(damaged)?.name() {
             names.insert(text(name));
         }
@@ -220,7 +221,7 @@ fn names(file: &object::File<'_>) -> Result<HashSet<String>, String> {
     Ok(names)
 }
 
-/// A library for several processors in one file, as macOS has them.
+/// Whether one file contains a library for several processors, as on macOS.
 fn is_fat(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0xca, 0xfe, 0xba, 0xbe])
 }
@@ -229,7 +230,7 @@ fn fat_exports(bytes: &[u8]) -> Result<HashSet<String>, String> {
     use object::read::macho::{FatArch, MachOFatFile32};
     let damaged = |e: object::Error| format!("is not a shared library: {e}");
     let fat = MachOFatFile32::parse(bytes).map_err(damaged)?;
-    // Every part must export everything, so the common names count.
+    // Every part must export everything, so only common names count.
     let mut common: Option<HashSet<String>> = None;
     for part in fat.arches() {
         let data = part.data(bytes).map_err(damaged)?;

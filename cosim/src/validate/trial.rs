@@ -1,4 +1,4 @@
-//! Trial of an FMU: `run` starts this program again, and [`perform`] does the trial there. The FMU runs only
+//! Trial of an FMU. `run` starts this program again, and [`perform`] makes the trial there. The FMU runs only
 //! there, so that its crash, hang or `exit()` is a finding.
 
 use std::collections::HashSet;
@@ -18,29 +18,30 @@ use crate::isolation::{self, Break, Child, End, Voice};
 
 /// The name of the trial's instance.
 const INSTANCE: &str = "trial";
-/// The file that findings name.
+/// The place that findings name.
 const PLACE: &str = "trial";
 /// The greatest number of steps of one pass.
 const STEPS: u32 = 10;
-/// The share of the time limit that the steps of one pass may take. An FMU that is slow makes fewer of them.
+/// The fraction of the time limit that the steps of one pass may take. A slow FMU makes fewer steps.
 const SHARE_OF_PASS: f64 = 0.2;
-/// The step in seconds where the FMU suggests none.
+/// The step in seconds if the FMU suggests none.
 const STEP: f64 = 0.01;
-/// Relative difference of a real value from its start value that is allowed, since decimals can be read in other
-/// ways.
+/// Allowed relative difference of a real value from its start value, since decimals can be parsed
+/// differently.
 const CLOSE: f64 = 1e-12;
 
 /// The greatest number of pairs of an output and an input whose derivatives are compared.
 const PAIRS: usize = 50;
-/// The change of inputs for quotients of differences, by the size of the input.
+/// The change of inputs for difference quotients, relative to the size of the input.
 const DIFFERENCE: f64 = 1e-6;
-/// Difference of a derivative from a quotient of differences that is allowed, by its size: the quotient is that inexact.
+/// Allowed relative difference of a derivative from a difference quotient, which is no more accurate than
+/// that.
 const AGREE: f64 = 1e-4;
-/// Relative difference of the adjoint derivative from the directional one that is allowed; both are exact.
+/// Allowed relative difference between the adjoint and the directional derivative; both are exact.
 const ADJOINT: f64 = 1e-9;
 
-/// The reason why there can be no trial of an FMU of this `version`, if there is one. `needs_tool` says whether it needs
-/// another program to run.
+/// The reason why an FMU of this `version` cannot be tried, if there is one. `needs_tool` says whether it
+/// needs another program to run.
 pub(super) fn reason_to_skip(
     archive: &Archive,
     version: Version,
@@ -55,7 +56,7 @@ pub(super) fn reason_to_skip(
             return Some(reason.to_owned());
         }
     }
-    // What is wrong with the library of another platform is no obstacle.
+    // A defect of another platform's library does not prevent the trial.
     let own = version.platform();
     let folder = format!("binaries/{own}/");
     for (head, reason) in
@@ -71,7 +72,7 @@ pub(super) fn reason_to_skip(
     needs_tool.then(|| "the FMU needs a tool that drives it (needsExecutionTool)".to_owned())
 }
 
-/// Tries the FMU in a child process, at most for `limit`.
+/// Tries the FMU in a child process, for at most `limit`.
 pub(super) fn run(path: &Path, limit: Duration, findings: &mut Findings) -> Result<(), Error> {
     let child = Child::new()?;
     let words: Vec<OsString> = vec![
@@ -83,7 +84,7 @@ pub(super) fn run(path: &Path, limit: Duration, findings: &mut Findings) -> Resu
         child.folder().into(),
     ];
     let end = child.run(words, Voice::Silent, Some(limit))?;
-    // Findings that the child wrote before its end. A line cut off by a crash is no finding.
+    // The findings that the child wrote before it ended. A line cut off by a crash does not count.
     let reported = std::fs::read_to_string(findings_file(child.folder())).unwrap_or_default();
     for finding in reported.lines().filter_map(|line| serde_json::from_str(line).ok()) {
         findings.push(finding);
@@ -128,7 +129,8 @@ fn findings_file(folder: &Path) -> PathBuf {
     folder.join("findings.jsonl")
 }
 
-/// Tries the FMU at `path` in this process, which has so much time. Its findings go into files in `folder`, at once.
+/// Tries the FMU at `path` in this process within `limit`. Each finding is written to a file in `folder`
+/// immediately.
 ///
 /// # Errors
 ///
@@ -150,7 +152,7 @@ struct Trial {
     file: File,
     /// The time that the trial may take.
     limit: Duration,
-    /// Rule and variable of the findings reported: the same finding at every step teaches nothing.
+    /// Rule and variable of the findings already reported: repeating one at every step adds nothing.
     reported: HashSet<(&'static str, Option<String>)>,
 }
 
@@ -162,11 +164,11 @@ impl Trial {
         let severity = severity(rule);
         let place = Place { file: PLACE.to_owned(), position: None, variable: variable.map(str::to_owned) };
         let finding = Finding { severity, rule: rule.to_owned(), place, message: message.to_owned() };
-        // The watching process tells that this one left nothing, if so.
+        // If nothing can be written, the watching process reports that.
         let _ = serde_json::to_string(&finding).map(|line| self.file.write_all((line + "\n").as_bytes()));
     }
 
-    /// Tells what ends a part of the trial early.
+    /// Reports an error that ends a part of the trial early.
     fn note(&mut self, part: impl FnOnce(&mut Self) -> Result<(), Error>) {
         let Err(error) = part(self) else { return };
         let rule = match error.as_call() {
@@ -196,7 +198,7 @@ impl Trial {
         done
     }
 
-    /// Two runs, the second after a reset and with start values set, and a second instance.
+    /// Makes two runs, the second after a reset and with start values set, and uses a second instance.
     fn passes(
         &mut self,
         fmu: &Rc<Fmu>,
@@ -231,7 +233,7 @@ impl Trial {
         Ok(())
     }
 
-    /// From initialisation to termination; returns the Real outputs at the end.
+    /// Runs from initialisation to termination; returns the Real outputs at the end.
     fn pass(
         &mut self,
         slave: &mut dyn Slave,
@@ -265,7 +267,8 @@ impl Trial {
                 break;
             }
         }
-        // Before derivatives are compared with differences: inputs that are set again belong to the present time.
+        // Read before derivatives are compared with differences, since that sets inputs again at the present
+        // time.
         let last = self.outputs(slave, variables)?;
         if !set {
             self.derivatives(slave, description)?;
@@ -305,7 +308,7 @@ impl Trial {
         Ok(outputs)
     }
 
-    /// The values as numbers; `None` for what is none.
+    /// The values as numbers; `None` if they are not numbers.
     fn get(&mut self, slave: &mut dyn Slave, array: &[Variable]) -> Result<Option<Vec<f64>>, Error> {
         let first = &array[0];
         if first.of == DataType::String {
@@ -340,7 +343,7 @@ impl Trial {
         let Some(values) = self.get(slave, array)? else { return Ok(()) };
         for (v, value) in array.iter().zip(values) {
             let Some(start) = v.start else { continue };
-            // A float of 32 bits is not the decimal number of the description.
+            // A 32-bit float differs from the decimal number in the description.
             let close = if v.of == DataType::Float32 { f64::from(f32::EPSILON) } else { CLOSE };
             if (value - start).abs() > close * start.abs() || value.is_nan() != start.is_nan() {
                 let text = format!("is {value} after initialisation; the description says start = {start}");
@@ -350,7 +353,8 @@ impl Trial {
         Ok(())
     }
 
-    /// Makes a step, goes back, and makes it again: from the state, and from the state that was bytes between.
+    /// Makes a step, goes back, and repeats it: first from the state, then from the state serialised in
+    /// between.
     fn go_back(
         &mut self,
         slave: &mut dyn Slave,
@@ -392,7 +396,8 @@ impl Trial {
         }
     }
 
-    /// Compares derivatives of outputs by inputs with differences, and adjoint ones with directional ones.
+    /// Compares derivatives of outputs with respect to inputs with differences, and adjoint ones with
+    /// directional ones.
     fn derivatives(&mut self, slave: &mut dyn Slave, description: &Description) -> Result<(), Error> {
         if !description.derivatives[0] || slave.version() != Version::Fmi3 {
             return Ok(());
@@ -409,7 +414,7 @@ impl Trial {
         }
         for (output, input) in pairs.into_iter().take(PAIRS) {
             match self.derivative(slave, array(output), array(input), description.derivatives[1]) {
-                // It has none here, such as at a kink: nothing to compare with.
+                // There is no derivative at this point, such as at a kink, and so nothing to compare.
                 Err(error) if is_discarded(&error) => {}
                 other => other?,
             }
@@ -430,7 +435,8 @@ impl Trial {
         if !slave.derivative(false, (unknown, known), &direction, &mut directional)? {
             return Ok(());
         }
-        // Differences to both sides; where they differ, there is a kink, and nothing to compare with.
+        // One-sided difference quotients in both directions. If they differ, there is a kink, and nothing to
+        // compare with.
         let mut at = vec![0.0; input.len()];
         slave.get(DataType::Float64, &[known], &mut at)?;
         let size = at.iter().fold(1.0, |size: f64, x| size.max(x.abs()));
@@ -509,13 +515,13 @@ impl Plan {
         self.start + f64::from(k) * self.step
     }
 
-    /// Makes fewer steps where one takes so long that a pass would take too much of the time limit.
+    /// Makes fewer steps if one takes so long that a pass would exceed its fraction of the time limit.
     fn shorten(&mut self, step: Duration, limit: Duration) {
         let most = SHARE_OF_PASS * limit.as_secs_f64() / step.as_secs_f64().max(1e-9);
         self.steps = self.steps.min(most.clamp(1.0, f64::from(STEPS)) as u32);
     }
 
-    /// The suggested experiment, cut short.
+    /// The suggested experiment, shortened.
     fn of(description: &Description) -> Self {
         let suggested = description.default_experiment.unwrap_or_default();
         let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
@@ -529,7 +535,7 @@ impl Plan {
     }
 }
 
-/// Whether two scalars that stand together are elements of one array.
+/// Whether two adjacent scalars are elements of one array.
 fn same(a: &Variable, b: &Variable) -> bool {
     b.element == a.element + 1
 }

@@ -1,18 +1,18 @@
-//! The C interface of FMI 2.0: the types of `fmi2TypesPlatform.h` and `fmi2FunctionTypes.h`, and one table of the
-//! functions of co-simulation. All code that exports, calls or looks for them takes them from here.
+//! The C interface of FMI 2.0: the types of `fmi2TypesPlatform.h` and `fmi2FunctionTypes.h`, and one table of
+//! the functions of co-simulation. All code that exports, calls or resolves them uses these definitions.
 
 use std::ffi::{c_char, c_int, c_uint, c_void};
 use std::fmt;
 
-/// `fmi2Component`: an instance, as only its library knows it.
+/// `fmi2Component`: an instance, opaque except to its library.
 pub type Component = *mut c_void;
-/// `fmi2ComponentEnvironment`: a pointer that the importer gets back with each message.
+/// `fmi2ComponentEnvironment`: a pointer that is passed back to the importer with each message.
 pub type Environment = *mut c_void;
 /// `fmi2FMUstate`.
 pub type State = *mut c_void;
 /// `fmi2ValueReference`.
 pub type ValueReference = c_uint;
-/// `fmi2Boolean`: 0 is false, else true.
+/// `fmi2Boolean`: 0 is false, everything else is true.
 pub type Boolean = c_int;
 /// `fmi2String`: NULL, or text that ends with a zero byte.
 pub type Text = *const c_char;
@@ -40,7 +40,7 @@ impl Status {
     pub const OK: Self = Self(0);
     /// `fmi2Warning`: done, with a remark in the log.
     pub const WARNING: Self = Self(1);
-    /// `fmi2Discard`: not done; the instance is as before.
+    /// `fmi2Discard`: not done; the instance is unchanged.
     pub const DISCARD: Self = Self(2);
     /// `fmi2Error`: not done; the instance can only be reset or freed.
     pub const ERROR: Self = Self(3);
@@ -49,7 +49,7 @@ impl Status {
     /// `fmi2Pending`: still being done (asynchronous steps).
     pub const PENDING: Self = Self(5);
 
-    /// Whether the standard knows this number.
+    /// Whether the standard defines this number.
     pub fn is_known(self) -> bool {
         (Self::OK.0..=Self::PENDING.0).contains(&self.0)
     }
@@ -76,7 +76,7 @@ pub type Logger = unsafe extern "C" fn(Environment, Text, Status, Text, Text, ..
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct CallbackFunctions {
-    /// Takes messages.
+    /// Receives messages.
     pub logger: Option<Logger>,
     /// `calloc`.
     pub allocate_memory: Option<unsafe extern "C" fn(usize, usize) -> *mut c_void>,
@@ -84,14 +84,14 @@ pub struct CallbackFunctions {
     pub free_memory: Option<unsafe extern "C" fn(*mut c_void)>,
     /// Called at the end of an asynchronous step.
     pub step_finished: Option<unsafe extern "C" fn(Environment, Status)>,
-    /// Handed back to `logger`.
+    /// Passed back to `logger`.
     pub environment: Environment,
 }
 
-/// Hands the 34 functions of FMI 2.0 co-simulation to the macro `$with`, a row each: a name in snake case, the
-/// name of its type, its own name, and its signature.
+/// Passes the 34 functions of FMI 2.0 co-simulation to the macro `$with`, one row each: a name in snake case,
+/// the name of its type, its own name, and its signature.
 ///
-/// The signatures name the types of [`fmi2`](crate::fmi2), which must be in scope where the rows are used.
+/// The signatures use the types of [`fmi2`](crate::fmi2), which must be in scope where the rows are expanded.
 #[macro_export]
 macro_rules! fmi2_functions {
     ($with:ident) => {

@@ -1,24 +1,24 @@
-//! The C interface of FMI 3.0: the types of `fmi3PlatformTypes.h` and `fmi3FunctionTypes.h`, and one table of the
-//! functions. All code that exports, calls or looks for them takes them from here.
+//! The C interface of FMI 3.0: the types of `fmi3PlatformTypes.h` and `fmi3FunctionTypes.h`, and one table of
+//! the functions. All code that exports, calls or resolves them uses these definitions.
 
 use std::ffi::{c_char, c_int, c_void};
 use std::fmt;
 
-/// `fmi3Instance`, as only its library knows it.
+/// `fmi3Instance`, opaque except to its library.
 pub type Instance = *mut c_void;
-/// `fmi3InstanceEnvironment`: a pointer that the importer gets back with each callback.
+/// `fmi3InstanceEnvironment`: a pointer that is passed back to the importer with each callback.
 pub type Environment = *mut c_void;
 /// `fmi3FMUState`.
 pub type State = *mut c_void;
 /// `fmi3ValueReference`.
 pub type ValueReference = u32;
-/// `fmi3Boolean`, a C `bool`: 0 is false. A library may write any byte, so this is no Rust `bool`.
+/// `fmi3Boolean`, a C `bool`: 0 is false. A library may write any byte, so it is not a Rust `bool`.
 pub type Boolean = u8;
 /// `fmi3Clock`, a C `bool`: 0 is inactive.
 pub type Clock = u8;
 /// `fmi3String`: NULL, or text that ends with a zero byte.
 pub type Text = *const c_char;
-/// `fmi3Binary`: NULL, or as many bytes as its size says.
+/// `fmi3Binary`: NULL, or as many bytes as its size gives.
 pub type Binary = *const u8;
 /// `fmi3DependencyKind`.
 pub type DependencyKind = c_int;
@@ -42,14 +42,14 @@ impl Status {
     pub const OK: Self = Self(0);
     /// `fmi3Warning`: done, with a remark in the log.
     pub const WARNING: Self = Self(1);
-    /// `fmi3Discard`: not done; the instance is as before.
+    /// `fmi3Discard`: not done; the instance is unchanged.
     pub const DISCARD: Self = Self(2);
     /// `fmi3Error`: not done; the instance can only be reset or freed.
     pub const ERROR: Self = Self(3);
     /// `fmi3Fatal`: not done; no instance of this FMU can be used any more.
     pub const FATAL: Self = Self(4);
 
-    /// Whether the standard knows this number.
+    /// Whether the standard defines this number.
     pub fn is_known(self) -> bool {
         (Self::OK.0..=Self::FATAL.0).contains(&self.0)
     }
@@ -68,22 +68,23 @@ impl fmt::Display for Status {
     }
 }
 
-/// `fmi3LogMessageCallback`: environment, status, category, message. NULL: no messages.
+/// `fmi3LogMessageCallback`: environment, status, category, message. NULL means no messages.
 pub type LogMessage = Option<unsafe extern "C" fn(Environment, Status, Text, Text)>;
 /// `fmi3ClockUpdateCallback`.
 pub type ClockUpdate = Option<unsafe extern "C" fn(Environment)>;
 /// `fmi3IntermediateUpdateCallback`: environment, time, whether values may be set and read, whether a step is
-/// finished, whether it can return early; then whether and when the importer wants that.
+/// finished, whether it can return early; then, as outputs, whether and when the importer wants an early
+/// return.
 pub type IntermediateUpdate = Option<
     unsafe extern "C" fn(Environment, f64, Boolean, Boolean, Boolean, Boolean, *mut Boolean, *mut f64),
 >;
 /// `fmi3LockPreemptionCallback` and `fmi3UnlockPreemptionCallback`.
 pub type Preemption = Option<unsafe extern "C" fn()>;
 
-/// Hands the 75 functions of FMI 3.0 to the macro `$with`, a row each: a name in snake case, the name of its type,
-/// its own name, and its signature.
+/// Passes the 75 functions of FMI 3.0 to the macro `$with`, one row each: a name in snake case, the name of
+/// its type, its own name, and its signature.
 ///
-/// The signatures name the types of [`fmi3`](crate::fmi3), which must be in scope where the rows are used.
+/// The signatures use the types of [`fmi3`](crate::fmi3), which must be in scope where the rows are expanded.
 #[macro_export]
 macro_rules! fmi3_functions {
     ($with:ident) => {

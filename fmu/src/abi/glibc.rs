@@ -1,11 +1,12 @@
-//! Old versions of glibc's functions, so that the shared library loads on distributions from 2014 on
-//! (glibc 2.17), wherever it was built. `build.rs` redirects the calls of the library, its dependencies
-//! and the standard library to the names defined here.
+//! Old versions of glibc's functions, so that the shared library loads on distributions from 2014 on (glibc
+//! 2.17), wherever it was built. `build.rs` redirects the calls of the library, its dependencies and the
+//! standard library to the names defined here.
 //!
-//! Functions that got a new version are named with the old one. `stat64` and `fstat64` were macros around another
-//! function until 2.33. The last four came later than 2.17: they are left undefined, weak, and the standard
-//! library asks at run time whether they are there and does without. `_dl_find_object` is what the unwinder of the compiler, which is
-//! linked into the library, asks for an object's table; it is found here as it was before 2.35.
+//! Functions with a newer version are linked to the old one. `stat64` and `fstat64` were macros around
+//! another function until 2.33. The four functions in `absent!` came after 2.17. They remain weak and
+//! undefined, and the standard library checks at run time whether they exist and works without them.
+//! `_dl_find_object` is how the compiler's unwinder, which is linked into the library, finds an object's
+//! table. Here it is implemented the way the table was found before 2.35.
 
 use std::arch::global_asm;
 use std::ffi::{c_char, c_int, c_void};
@@ -74,7 +75,7 @@ absent! {
     "__cxa_thread_atexit_impl"
 }
 
-/// `struct dl_phdr_info`, as far as it is read.
+/// `struct dl_phdr_info`, up to the fields that are read.
 #[repr(C)]
 struct Loaded {
     address: usize,
@@ -107,7 +108,7 @@ struct Found {
     reserved: [u64; 7],
 }
 
-/// An address, and the object that it is in.
+/// An address, and the object that contains it.
 struct Wanted {
     address: usize,
     found: Option<Found>,
@@ -120,15 +121,15 @@ unsafe extern "C" {
     ) -> c_int;
 }
 
-/// Notes the object in `data`, a [`Wanted`], if the address is in it; ends the iteration then.
+/// If the object contains the address, notes it in `data`, a [`Wanted`], and ends the iteration.
 unsafe extern "C" fn look(loaded: *const Loaded, _size: usize, data: *mut c_void) -> c_int {
     const LOAD: u32 = 1;
     const EH_FRAME: u32 = 0x6474_e550;
     // SAFETY: `dl_iterate_phdr` passes an object.
     let loaded = unsafe { &*loaded };
-    // SAFETY: it passes on what it was given.
+    // SAFETY: `dl_iterate_phdr` passes on the data it was given.
     let wanted = unsafe { &mut *data.cast::<Wanted>() };
-    // SAFETY: so many headers it has.
+    // SAFETY: the object has that many headers.
     let headers = unsafe { std::slice::from_raw_parts(loaded.headers, usize::from(loaded.count)) };
     let place = |header: &Header| loaded.address.wrapping_add(header.address);
     let Some(part) = headers
@@ -150,14 +151,15 @@ unsafe extern "C" fn look(loaded: *const Loaded, _size: usize, data: *mut c_void
     1
 }
 
-/// `_dl_find_object`: writes the object that holds `address`, as far as an unwinder reads it; 0 if there is one.
+/// `_dl_find_object`: writes the object that contains `address`, up to the fields that an unwinder reads.
+/// Returns 0 if there is one.
 ///
 /// # Safety
 ///
 /// `result` is writable.
 unsafe extern "C" fn find_object(address: *const c_void, result: *mut Found) -> c_int {
     let mut wanted = Wanted { address: address as usize, found: None };
-    // SAFETY: `look` takes this data.
+    // SAFETY: `look` expects this data.
     unsafe { dl_iterate_phdr(look, (&raw mut wanted).cast()) };
     let Some(found) = wanted.found else { return -1 };
     // SAFETY: the caller's contract.

@@ -1,4 +1,4 @@
-//! The one boundary between C and Rust: NULL checks, panics, slices.
+//! The boundary between C and Rust: NULL checks, panics, slices.
 
 use std::any::Any;
 use std::ffi::{CStr, c_char, c_void};
@@ -14,12 +14,12 @@ use crate::instance::{Failure, Instance};
 pub(super) struct Handle {
     pub(super) instance: Instance,
     pub(super) logger: Logger,
-    /// Set once a panic came out of this instance: its values cannot be trusted any more.
+    /// Set once this instance panicked, since its values cannot be trusted any more.
     pub(super) poisoned: bool,
 }
 
 impl Handle {
-    /// Makes a step, and logs what the user should know of it.
+    /// Makes a step, and logs its notice for the user.
     pub(super) fn step(&mut self, t: f64, h: f64) -> Result<(), Failure> {
         self.instance.do_step(t, h)?;
         while let Some(notice) = self.instance.notice() {
@@ -54,8 +54,8 @@ impl Answer for fmi3::Status {
 /// Message and place of the last panic, kept by the hook for the log.
 static LAST_PANIC: Mutex<String> = Mutex::new(String::new());
 
-/// Keeps panics off the simulator's stderr; the guard logs them. The hook belongs to this library's own copy of
-/// the standard library.
+/// Prevents panics from printing to the simulator's stderr; the guard logs them. The hook belongs to this
+/// library's own copy of the standard library.
 pub(super) fn install_panic_hook() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -65,7 +65,7 @@ pub(super) fn install_panic_hook() {
     });
 }
 
-/// Runs `body`; a panic becomes its description.
+/// Runs `body`, and turns a panic into its description.
 pub(super) fn catch<R>(body: impl FnOnce() -> R) -> Result<R, String> {
     catch_unwind(AssertUnwindSafe(body)).map_err(|payload: Box<dyn Any + Send>| {
         // Dropping a payload can panic in turn; forgetting it cannot.
@@ -79,8 +79,8 @@ pub(super) fn catch<R>(body: impl FnOnce() -> R) -> Result<R, String> {
 ///
 /// # Safety
 ///
-/// `component` is NULL or was returned by a function that instantiates and not freed since, and no other call
-/// for it is under way.
+/// `component` is NULL, or was returned by an instantiating function and not freed since; no other call for
+/// it is in progress.
 pub(super) unsafe fn guarded<S: Answer>(
     component: *mut c_void,
     name: &str,
@@ -115,12 +115,12 @@ pub(super) unsafe fn guarded<S: Answer>(
     }
 }
 
-/// Returns OK where nothing is asked for, else an error with the reason.
+/// Returns OK if nothing is requested, else an error with the reason.
 pub(super) fn none<S: Answer>(why: &str, count: usize) -> Result<S, Failure> {
     if count == 0 { Ok(S::OK) } else { Err(format!("{why}: {count} values were asked for, must be 0")) }
 }
 
-/// `len` elements at `pointer`; nothing is read where `len` is 0.
+/// `len` elements at `pointer`; nothing is read if `len` is 0.
 ///
 /// # Safety
 ///
@@ -166,7 +166,7 @@ fn check_array<T>(name: &str, pointer: *const T, len: usize) -> Result<(), Failu
     if fits { Ok(()) } else { Err(no_array(name, pointer, len)) }
 }
 
-/// The reason why there are no `len` elements at `pointer`.
+/// The reason why there cannot be `len` elements at `pointer`.
 #[cold]
 fn no_array<T>(name: &str, pointer: *const T, len: usize) -> Failure {
     if pointer.is_null() {
@@ -178,7 +178,7 @@ fn no_array<T>(name: &str, pointer: *const T, len: usize) -> Failure {
     }
 }
 
-/// The text at `pointer`, bytes that are not UTF-8 replaced; `None` for NULL.
+/// The text at `pointer`, with bytes that are not UTF-8 replaced; `None` for NULL.
 ///
 /// # Safety
 ///

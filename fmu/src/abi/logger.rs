@@ -1,4 +1,4 @@
-//! Messages to the importer's logger.
+//! Sends messages to the importer's logger.
 
 use std::ffi::{CStr, CString, c_void};
 
@@ -12,41 +12,41 @@ const ERRORS: &CStr = c"logStatusError";
 /// The category of everything else.
 const EVENTS: &CStr = c"logEvents";
 
-/// The category of what the user should know though the call succeeded.
+/// The category of notices to the user although the call succeeded.
 const WARNINGS: &CStr = c"logStatusWarning";
 
-/// The function of the importer that takes messages, as its version of FMI declares it.
+/// The importer's function that receives messages, as its version of FMI declares it.
 enum Function {
     Fmi2 { logger: fmi2::Logger, instance_name: CString },
     Fmi3(unsafe extern "C" fn(fmi3::Environment, fmi3::Status, fmi3::Text, fmi3::Text)),
 }
 
-/// The logger of one instance, copied out of what the importer gave.
+/// The logger of one instance, copied from what the importer passed.
 pub(super) struct Logger {
     function: Option<Function>,
     environment: *mut c_void,
-    /// Whether events are wanted (`loggingOn` and the categories). Errors are always logged.
+    /// Whether events are enabled (`loggingOn` and the categories). Errors are always logged.
     events: bool,
-    /// Whether warnings are wanted. FMI 2.0 does not forbid one that nobody asked for, FMI 3.0 does.
+    /// Whether warnings are enabled. FMI 3.0 forbids warnings that were not requested, FMI 2.0 does not.
     warnings: bool,
 }
 
-// SAFETY: the environment pointer is only handed back to the importer's own function, within calls
-// that the importer makes; FMI lets it make them from any one thread at a time.
+// SAFETY: the environment pointer is only passed back to the importer's own function, within calls that the
+// importer makes; FMI allows these from any one thread at a time.
 unsafe impl Send for Logger {}
 
-/// What a message is about: the status and the category that it is sent with.
+/// The kind of a message, which determines its status and category.
 #[derive(Clone, Copy)]
-enum Matter {
+enum MessageKind {
     Error,
     Warning,
     Event,
-    /// A call that was not done, after which the run may go on.
+    /// A call was not done, but the run may continue.
     Discarded,
 }
 
 impl Logger {
-    /// The logger that `fmi2Instantiate` gave.
+    /// The logger passed to `fmi2Instantiate`.
     pub(super) fn of_fmi2(
         callbacks: Option<&fmi2::CallbackFunctions>,
         instance_name: CString,
@@ -61,38 +61,38 @@ impl Logger {
         }
     }
 
-    /// The logger that a function of FMI 3.0 gave.
+    /// The logger passed to an instantiating function of FMI 3.0.
     pub(super) fn of_fmi3(function: fmi3::LogMessage, environment: fmi3::Environment, on: bool) -> Self {
         Self { function: function.map(Function::Fmi3), environment, events: on, warnings: on }
     }
 
     /// Logs a failed call.
     pub(super) fn error(&self, message: &str) {
-        self.send(Matter::Error, message);
+        self.send(MessageKind::Error, message);
     }
 
-    /// Logs what the user should know.
+    /// Logs a notice to the user.
     pub(super) fn warning(&self, message: &str) {
         if self.warnings {
-            self.send(Matter::Warning, message);
+            self.send(MessageKind::Warning, message);
         }
     }
 
-    /// Logs why a call was not done, after which the run may go on.
+    /// Logs why a call was not done although the run may continue.
     pub(super) fn discarded(&self, message: &str) {
         if self.warnings {
-            self.send(Matter::Discarded, message);
+            self.send(MessageKind::Discarded, message);
         }
     }
 
-    /// Logs an event, if events are wanted.
+    /// Logs an event, if events are enabled.
     pub(super) fn event(&self, message: &str) {
         if self.events {
-            self.send(Matter::Event, message);
+            self.send(MessageKind::Event, message);
         }
     }
 
-    /// Switches categories; none named means all.
+    /// Enables or disables categories; none named means all.
     pub(super) fn set_debug_logging(&mut self, on: bool, categories: &[&str]) -> Result<(), String> {
         if let Some(unknown) = categories.iter().find(|c| LOG_CATEGORIES.iter().all(|(name, _)| name != *c)) {
             let names = LOG_CATEGORIES.map(|(name, _)| name).join(", ");
@@ -110,19 +110,19 @@ impl Logger {
         Ok(())
     }
 
-    fn send(&self, matter: Matter, message: &str) {
-        let category = match matter {
-            Matter::Error => ERRORS,
-            Matter::Warning | Matter::Discarded => WARNINGS,
-            Matter::Event => EVENTS,
+    fn send(&self, kind: MessageKind, message: &str) {
+        let category = match kind {
+            MessageKind::Error => ERRORS,
+            MessageKind::Warning | MessageKind::Discarded => WARNINGS,
+            MessageKind::Event => EVENTS,
         }
         .as_ptr();
-        // In both versions a status is the same number.
-        let status = match matter {
-            Matter::Error => fmi3::Status::ERROR,
-            Matter::Warning => fmi3::Status::WARNING,
-            Matter::Discarded => fmi3::Status::DISCARD,
-            Matter::Event => fmi3::Status::OK,
+        // Statuses have the same numbers in both versions.
+        let status = match kind {
+            MessageKind::Error => fmi3::Status::ERROR,
+            MessageKind::Warning => fmi3::Status::WARNING,
+            MessageKind::Discarded => fmi3::Status::DISCARD,
+            MessageKind::Event => fmi3::Status::OK,
         };
         match &self.function {
             None => {}

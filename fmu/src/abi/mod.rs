@@ -3,10 +3,11 @@
 //!
 //! # Safety
 //!
-//! Every function expects this of its caller, besides what it says itself: a component is NULL or came from
-//! `fmi2Instantiate` or its like of FMI 3.0 and was not freed; calls for one component do not overlap; an
-//! array is NULL or has as many elements as its count says; a string is NULL or NUL-terminated. NULL and wrong counts of
-//! zero are met with a status, never with a crash. A component of one version in a function of the other is refused.
+//! In addition to its own requirements, every function expects of its caller: a component is NULL or came
+//! from `fmi2Instantiate` or its counterpart of FMI 3.0 and was not freed; calls for one component do not
+//! overlap; an array is NULL or has as many elements as its count says; a string is NULL or NUL-terminated.
+//! NULL pointers and counts of zero are answered with a status, never with a crash. A component of one
+//! version is refused by functions of the other.
 
 #[macro_use]
 pub mod fmi2;
@@ -20,7 +21,7 @@ mod plugin;
 mod resources;
 mod states;
 
-/// Defines exports that take nothing but the component.
+/// Defines exports whose only argument is the component.
 macro_rules! plain {
     ($status:ty; $($(#[$doc:meta])* $name:ident => $body:expr;)*) => {$(
         $(#[$doc])*
@@ -55,8 +56,8 @@ use logger::Logger;
 use crate::configuration::FmiVersion;
 use crate::instance::{Failure, Instance};
 
-/// A new instance behind a pointer, or NULL with a log message under `name`. `arguments` checks what the importer said,
-/// and gives the token of the FMU and the place of its resources.
+/// A new instance behind a pointer, or NULL with a log message under `name`. `arguments` checks the
+/// importer's arguments, and returns the token of the FMU and the location of its resources.
 fn instantiated(
     name: &str,
     fmi: FmiVersion,
@@ -89,7 +90,7 @@ fn instantiated(
     }
 }
 
-/// Frees an instance, in any mode; NULL is fine.
+/// Frees an instance in any mode; NULL is allowed.
 ///
 /// # Safety
 ///
@@ -98,7 +99,7 @@ unsafe fn free(component: *mut c_void) {
     if !component.is_null() {
         // SAFETY: not NULL, so it came from `Box::into_raw` in `instantiated`, and is freed once.
         let handle = unsafe { Box::from_raw(component.cast::<Handle>()) };
-        // A panic while dropping must not reach the importer; memory that it leaves behind is leaked.
+        // A panic while dropping must not reach the importer; the memory that it leaves behind is leaked.
         let _ = catch(|| {
             states::free_all(&handle);
             drop(handle);
@@ -106,7 +107,7 @@ unsafe fn free(component: *mut c_void) {
     }
 }
 
-/// Switches log categories on or off; none named means all.
+/// Enables or disables log categories; none named means all.
 ///
 /// # Safety
 ///

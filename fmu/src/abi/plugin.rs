@@ -1,4 +1,4 @@
-//! Plug-ins: shared libraries with a model, as `include/punctual_model.h` describes them. Its types in Rust stand
+//! Plug-ins: shared libraries with a model, as described in `include/punctual_model.h`. Its types in Rust are
 //! in `punctual_model.rs`, the file that plug-ins copy, and are used from there.
 
 #[allow(
@@ -47,7 +47,7 @@ type GetModel = unsafe extern "C" fn() -> *const RawModel;
 /// The name of the export.
 const SYMBOL: &str = "punctual_model";
 
-/// The folder in which plug-ins are looked for.
+/// The folder that is searched for plug-ins.
 pub struct PluginFolder {
     folder: PathBuf,
     watch: fn(&Path, &str),
@@ -59,8 +59,8 @@ impl PluginFolder {
         Self { folder: folder.into(), watch: |_, _| {} }
     }
 
-    /// Has `watch` told the file and the next action before it is done. So a process that watches this one knows
-    /// where it ended.
+    /// Makes `watch` receive the file and the next action before it is performed, so that a process that
+    /// watches this one knows where it ended.
     #[must_use]
     pub fn watched(self, watch: fn(&Path, &str)) -> Self {
         Self { watch, ..self }
@@ -72,16 +72,16 @@ impl PluginFolder {
     }
 }
 
-/// The name of the file of the plug-in `name` on this platform.
+/// The file name of the plug-in `name` on this platform.
 pub fn file_name(name: &str) -> String {
     format!("{DLL_PREFIX}{name}{DLL_SUFFIX}")
 }
 
-/// The path of a library as Windows loads it, together with libraries beside it: absolute, with backslashes, and where it is
-/// long in the form that may be.
+/// The path in the form with which Windows also finds libraries beside it: absolute, with backslashes, and if
+/// it is long, in the form for long paths.
 #[cfg(windows)]
 pub fn loadable(path: &Path) -> PathBuf {
-    /// The length from which on other forms are refused (MAX_PATH).
+    /// The length from which Windows refuses other forms (MAX_PATH).
     const LONG: usize = 260;
     let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     if path.as_os_str().len() < LONG { path } else { path.canonicalize().unwrap_or(path) }
@@ -104,14 +104,14 @@ impl PluginLoader for PluginFolder {
 }
 
 fn open(path: &Path) -> Result<Library, libloading::Error> {
-    // Without a folder the system would look elsewhere.
+    // Without a folder, the system would search elsewhere.
     if path.parent() == Some(Path::new("")) { open_at(&Path::new(".").join(path)) } else { open_at(path) }
 }
 
 #[cfg(unix)]
 fn open_at(path: &Path) -> Result<Library, libloading::Error> {
     use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
-    // SAFETY: running the initialisers of the plug-in is what the user asked for by naming it.
+    // SAFETY: running the plug-in's initialisers is what the user asked for by naming it.
     let library = unsafe { Library::open(Some(path), RTLD_NOW | RTLD_LOCAL) }?;
     Ok(library.into())
 }
@@ -119,8 +119,8 @@ fn open_at(path: &Path) -> Result<Library, libloading::Error> {
 #[cfg(windows)]
 fn open_at(path: &Path) -> Result<Library, libloading::Error> {
     use libloading::os::windows::{LOAD_WITH_ALTERED_SEARCH_PATH, Library};
-    // Libraries that it needs lie beside it.
-    // SAFETY: running the initialisers of the plug-in is what the user asked for by naming it.
+    // Libraries that it depends on lie beside it.
+    // SAFETY: running the plug-in's initialisers is what the user asked for by naming it.
     let library = unsafe { Library::load_with_flags(loadable(path), LOAD_WITH_ALTERED_SEARCH_PATH) }?;
     Ok(library.into())
 }
@@ -128,9 +128,9 @@ fn open_at(path: &Path) -> Result<Library, libloading::Error> {
 fn loaded(path: &Path, file: &str, watch: fn(&Path, &str)) -> Result<Plugin, String> {
     // Load the library, and call its one export.
     watch(path, "its loading");
-    // The error text of the system names a path of this machine and gives the reason.
+    // The system's error text contains a path of this machine and gives the reason.
     let library = open(path).map_err(|e| format!("cannot be loaded: {}", chain(&e)))?;
-    // SAFETY: the header gives the function of this name this type.
+    // SAFETY: in the header, the function of this name has this type.
     let symbol = unsafe { library.get::<GetModel>(SYMBOL) };
     let get = *symbol.map_err(|_| format!("exports no {SYMBOL}, the function that makes it a plug-in"))?;
     watch(path, SYMBOL);
@@ -241,7 +241,7 @@ fn variables(
     if !first.is_aligned() {
         return Err(format!("{field} is not aligned to {} bytes", align_of::<RawVariable>()));
     }
-    // SAFETY: not NULL, aligned, and the header asks for as many as are counted, which are few.
+    // SAFETY: not NULL, aligned, and the header requires as many as are counted, which are few.
     let list = unsafe { std::slice::from_raw_parts(first, count as usize) };
     let row = |(i, raw): (usize, &RawVariable)| {
         let path = |part: &str| format!("{field}[{i}].{part}");
@@ -261,7 +261,7 @@ fn text(field: &str, pointer: *const c_char) -> Result<Option<String>, String> {
     if pointer.is_null() {
         return Ok(None);
     }
-    // SAFETY: not NULL, and the header asks for a text that ends with zero.
+    // SAFETY: not NULL, and the header requires a NUL-terminated text.
     let bytes = unsafe { CStr::from_ptr(pointer) };
     let text = bytes.to_str().map_err(|_| format!("{field} is not UTF-8"))?;
     match text.len() {
@@ -279,10 +279,10 @@ struct LoadedCode {
     _library: Library,
 }
 
-/// A number that no code was given and that is not `LITERAL`: code that uses it is found out.
+/// A number that no code was given, and different from `LITERAL`, so that code which uses it is detected.
 const UNKNOWN: Number = Number::MAX - 1;
 
-/// The operation for the code behind `host`.
+/// Performs an operation for the code behind `host`.
 extern "C" fn apply(host: *mut c_void, operation: u32, a: Number, b: Number, literal: f64) -> Number {
     let result = catch(|| {
         // SAFETY: `called` made `host` of such a reference, which lives during the call.
@@ -292,7 +292,7 @@ extern "C" fn apply(host: *mut c_void, operation: u32, a: Number, b: Number, lit
     result.unwrap_or(UNKNOWN)
 }
 
-/// The value for the code behind `host`.
+/// Reads a value for the code behind `host`.
 extern "C" fn value(host: *mut c_void, a: Number) -> f64 {
     let result = catch(|| {
         // SAFETY: as in `apply`.
@@ -302,7 +302,7 @@ extern "C" fn value(host: *mut c_void, a: Number) -> f64 {
     result.unwrap_or(f64::NAN)
 }
 
-/// Hands `calculator` to `body` in the form that the code takes.
+/// Passes `calculator` to `body` in the form that the code expects.
 fn called<R>(mut calculator: &mut dyn Calculator, body: impl FnOnce(*const RawCalculator) -> R) -> R {
     let raw = RawCalculator { host: (&raw mut calculator).cast(), apply, value };
     body(&raw const raw)
@@ -320,7 +320,8 @@ impl Code for LoadedCode {
         let Dimensions { states, inputs, .. } = self.dimensions;
         assert!(x.len() == states && f.len() == states && g.len() == states * inputs);
         assert!(parameters.len() == self.parameters);
-        // SAFETY: the arrays have the lengths that the header promises; what the code does in them is its own.
+        // SAFETY: the arrays have the lengths that the header promises; what the code does with them is its
+        // own responsibility.
         called(c, |raw| unsafe {
             (self.plant)(raw, parameters.as_ptr(), x.as_ptr(), f.as_mut_ptr(), g.as_mut_ptr());
         });

@@ -1,4 +1,4 @@
-//! From `fmuResourceLocation` or `resourcePath` to the configuration.
+//! Reads the configuration from `fmuResourceLocation` or `resourcePath`.
 
 use std::path::PathBuf;
 
@@ -32,13 +32,13 @@ fn folder(location: &str) -> Result<PathBuf, String> {
         }
         return Ok(PathBuf::from(location));
     };
-    // A raw path may contain blanks or a percent sign. So it is taken as it is where the decoded one does not
+    // A raw path may contain blanks or a percent sign, so it is used unchanged if the decoded path does not
     // exist.
     let (raw, decoded) = (path(rest, cfg!(windows)), path(&decode(rest)?, cfg!(windows)));
     Ok(if !decoded.exists() && raw.exists() { raw } else { decoded })
 }
 
-/// The path after `file:`. On Windows `shares` follow two slashes, or four.
+/// The path after `file:`. On Windows, `shares` follow two or four slashes.
 fn path(rest: &str, shares: bool) -> PathBuf {
     // file:/p, file:///p and file:////p mean the same, and so does file://localhost/p.
     let rest = rest.strip_prefix("//localhost/").unwrap_or(rest);

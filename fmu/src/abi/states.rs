@@ -1,9 +1,9 @@
-//! States: snapshots in memory, and as bytes. The six functions are the same in both versions of FMI but for their names
-//! and types.
+//! States: snapshots in memory, and serialised. The six functions differ between the versions of FMI only in
+//! their names and types.
 //!
-//! The importer holds a number, not an address. Nothing is ever read through it, a number is given once, and one
-//! that is not of a live state is refused. A state can be used by every instance of its FMU in the process. It
-//! ends with `fmi2FreeFMUstate` or `fmi3FreeFMUState`, or with the instance that made it.
+//! The importer holds a number, not an address. It is never dereferenced, each number is used once, and a
+//! number that does not denote a live state is refused. Every instance of the FMU in the process can use a
+//! state. A state ends with `fmi2FreeFMUstate` or `fmi3FreeFMUState`, or with the instance that made it.
 
 use std::collections::BTreeMap;
 use std::ffi::{c_char, c_void};
@@ -16,11 +16,11 @@ use crate::configuration::FmiVersion;
 use crate::instance::{Failure, State};
 use crate::state;
 
-/// The live states of the process, by number. Locked by the functions of this file only, never by a step.
+/// The live states of the process, by number. Only the functions of this file lock it, never a step.
 static STATES: Mutex<States> = Mutex::new(States { last: 0, live: BTreeMap::new() });
 
 struct States {
-    /// The last number given.
+    /// The last number used.
     last: usize,
     live: BTreeMap<usize, Entry>,
 }
@@ -64,13 +64,14 @@ impl States {
     }
 }
 
-/// Frees the states that an instance leaves behind.
+/// Frees the states that an instance has left.
 pub(super) fn free_all(owner: &Handle) {
     let mut states = States::lock();
     let address = ptr::from_ref(owner).addr();
     states.live.retain(|_, entry| entry.owner != address);
     if states.live.is_empty() {
-        // Replacing the empty map frees its memory, so that nothing stays allocated when the library is unloaded.
+        // Replacing the empty map frees its memory, so that nothing stays allocated when the library is
+        // unloaded.
         states.live = BTreeMap::new();
     }
 }
@@ -78,7 +79,7 @@ pub(super) fn free_all(owner: &Handle) {
 /// Defines the six functions of a version: the types of its status and of its bytes, then the names.
 macro_rules! states {
     ($status:ty, $byte:ty; $get:ident $set:ident $free:ident $size:ident $serialize:ident $deserialize:ident) => {
-        /// Takes a snapshot, in any mode: into a new state where `*state` is NULL, else over that one.
+        /// Takes a snapshot in any mode: a new state if `*state` is NULL, else that state is overwritten.
         ///
         /// # Safety
         ///
@@ -100,7 +101,7 @@ macro_rules! states {
             unsafe { guarded(component, stringify!($get), body) }
         }
 
-        /// Restores a snapshot, an earlier or a later one, from any mode.
+        /// Restores an earlier or later snapshot, from any mode.
         ///
         /// # Safety
         ///
@@ -116,7 +117,7 @@ macro_rules! states {
             unsafe { guarded(component, stringify!($set), body) }
         }
 
-        /// Frees a state and sets `*state` to NULL; NULL is fine.
+        /// Frees a state and sets `*state` to NULL; NULL is allowed.
         ///
         /// # Safety
         ///
@@ -141,7 +142,8 @@ macro_rules! states {
             unsafe { guarded(component, stringify!($free), body) }
         }
 
-        /// Tells the number of bytes of a state: the same for all states of an FMU that follows no plans.
+        /// Returns the number of bytes of a state, which is the same for all states of an FMU that follows no
+        /// plans.
         ///
         /// # Safety
         ///
@@ -164,7 +166,7 @@ macro_rules! states {
             unsafe { guarded(component, stringify!($size), body) }
         }
 
-        /// Writes a state to `size` bytes; bytes beyond those needed become 0.
+        /// Writes a state to `size` bytes; extra bytes become 0.
         ///
         /// # Safety
         ///
@@ -187,7 +189,8 @@ macro_rules! states {
             unsafe { guarded(component, stringify!($serialize), body) }
         }
 
-        /// Makes a new state from bytes. The old value of `*state` is not looked at: the standard does not define it.
+        /// Makes a new state from bytes. The old value of `*state` is not read, since the standard does not
+        /// define it.
         ///
         /// # Safety
         ///

@@ -1,8 +1,8 @@
-//! The 34 functions of FMI 2.0 co-simulation. Those of states are in [`states`](super::states).
+//! The 34 functions of FMI 2.0 co-simulation. Those for states are in [`states`](super::states).
 //!
-//! `fmi2Warning`, `fmi2Fatal` and `fmi2Pending` are never returned. Several importers take a warning for a
-//! failure, and no failure leaves an instance that could not be freed. `fmi2Discard` means that a status asked
-//! for does not exist.
+//! `fmi2Warning`, `fmi2Fatal` and `fmi2Pending` are never returned. Several importers treat a warning as a
+//! failure, and an instance can be freed after any failure. `fmi2Discard` means that a requested status does
+//! not exist.
 
 use std::ffi::{CString, c_int};
 
@@ -46,7 +46,7 @@ extern "C" fn fmi2GetVersion() -> Text {
 ///
 /// # Safety
 ///
-/// See the module; `callbacks` is NULL or points to a structure that is read during this call only.
+/// See the module; `callbacks` is NULL or points to a structure that is only read during this call.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn fmi2Instantiate(
     instance_name: Text,
@@ -78,7 +78,7 @@ unsafe extern "C" fn fmi2Instantiate(
     })
 }
 
-/// Frees an instance, in any mode; NULL is fine.
+/// Frees an instance in any mode; NULL is allowed.
 ///
 /// # Safety
 ///
@@ -89,7 +89,7 @@ unsafe extern "C" fn fmi2FreeInstance(component: Component) {
     unsafe { free(component) }
 }
 
-/// Switches log categories on or off; none named means all.
+/// Enables or disables log categories; none named means all.
 ///
 /// # Safety
 ///
@@ -107,7 +107,7 @@ unsafe extern "C" fn fmi2SetDebugLogging(
     unsafe { guarded(component, "fmi2SetDebugLogging", body) }
 }
 
-/// Takes the start time.
+/// Sets the start time.
 ///
 /// # Safety
 ///
@@ -131,9 +131,9 @@ unsafe extern "C" fn fmi2SetupExperiment(
 
 plain! {
     Status;
-    /// Goes to initialization mode.
+    /// Enters initialization mode.
     fmi2EnterInitializationMode => |handle| handle.instance.enter_initialization_mode();
-    /// Takes the parameters over and goes to step mode.
+    /// Applies the parameters and enters step mode.
     fmi2ExitInitializationMode => |handle| {
         handle.instance.exit_initialization_mode()?;
         handle.logger.event("initialized");
@@ -141,7 +141,7 @@ plain! {
     };
     /// Ends the run.
     fmi2Terminate => |handle| handle.instance.terminate();
-    /// Goes back to the instantiated state.
+    /// Returns to the instantiated state.
     fmi2Reset => |handle| {
         handle.instance.reset();
         handle.logger.event("reset");
@@ -192,7 +192,7 @@ values! {
     fmi2SetBoolean(*const Boolean, slice) => set_boolean;
 }
 
-/// Reads strings; there are none, so only zero of them can be read.
+/// Reads strings. There are none, so only zero of them can be read.
 ///
 /// # Safety
 ///
@@ -213,7 +213,7 @@ unsafe extern "C" fn fmi2GetString(
     unsafe { guarded(component, "fmi2GetString", body) }
 }
 
-/// Writes strings; there are none, so only zero of them can be written.
+/// Writes strings. There are none, so only zero of them can be written.
 ///
 /// # Safety
 ///
@@ -264,7 +264,7 @@ unsafe extern "C" fn fmi2GetDirectionalDerivative(
     unsafe { guarded(component, "fmi2GetDirectionalDerivative", body) }
 }
 
-/// Makes a communication step. The last argument is ignored: importers pass true while rolling back.
+/// Makes a communication step. The last argument is ignored, since importers pass true while rolling back.
 ///
 /// # Safety
 ///
@@ -284,7 +284,7 @@ unsafe extern "C" fn fmi2DoStep(
     unsafe { guarded(component, "fmi2DoStep", body) }
 }
 
-/// Gives the end of the last successful step (`fmi2LastSuccessfulTime`); other kinds are discarded.
+/// Returns the end of the last successful step (`fmi2LastSuccessfulTime`); other kinds are discarded.
 ///
 /// # Safety
 ///
@@ -304,7 +304,7 @@ unsafe extern "C" fn fmi2GetRealStatus(component: Component, kind: StatusKind, v
     unsafe { guarded(component, "fmi2GetRealStatus", body) }
 }
 
-/// Tells whether the run has ended (`fmi2Terminated`); other kinds are discarded.
+/// Returns whether the run has ended (`fmi2Terminated`); other kinds are discarded.
 ///
 /// # Safety
 ///
@@ -328,10 +328,10 @@ unsafe extern "C" fn fmi2GetBooleanStatus(
     unsafe { guarded(component, "fmi2GetBooleanStatus", body) }
 }
 
-/// Defines exports for statuses that do not exist, since nothing is asynchronous here: discarded.
+/// Defines exports for statuses that do not exist, since nothing is asynchronous here; they are discarded.
 macro_rules! no_status {
     ($($name:ident($pointer:ty);)*) => {$(
-        /// A status of asynchronous steps, of which there are none: discarded.
+        /// A status of asynchronous steps, which do not exist here; it is discarded.
         ///
         /// # Safety
         ///
@@ -351,7 +351,7 @@ no_status! {
     fmi2GetStringStatus(*mut Text);
 }
 
-/// Reads time derivatives of outputs: `maxOutputDerivativeOrder` is 0, so only zero of them can be read.
+/// Reads time derivatives of outputs. `maxOutputDerivativeOrder` is 0, so only zero of them can be read.
 ///
 /// # Safety
 ///
@@ -370,7 +370,7 @@ unsafe extern "C" fn fmi2GetRealOutputDerivatives(
     }
 }
 
-/// Sets time derivatives of inputs: `canInterpolateInputs` is false, so only zero of them can be set.
+/// Sets time derivatives of inputs. `canInterpolateInputs` is false, so only zero of them can be set.
 ///
 /// # Safety
 ///
@@ -389,7 +389,7 @@ unsafe extern "C" fn fmi2SetRealInputDerivatives(
     }
 }
 
-/// Refuses to cancel a step: nothing runs asynchronously, so there is nothing to cancel.
+/// Refuses to cancel a step: nothing is asynchronous, so there is nothing to cancel.
 ///
 /// # Safety
 ///

@@ -1,8 +1,8 @@
-//! The 75 functions of FMI 3.0. Those of FMU states are in [`states`](super::states), those of features that our
-//! FMUs do not have in [`absent`].
+//! The 75 functions of FMI 3.0. Those for FMU states are in [`states`](super::states), those of features that
+//! our FMUs lack in [`absent`].
 //!
-//! `fmi3Warning` and `fmi3Fatal` are never returned. `fmi3Discard` means that a derivative does not exist here; the run may
-//! go on.
+//! `fmi3Warning` and `fmi3Fatal` are never returned. `fmi3Discard` means that a derivative does not exist at
+//! this point; the run may continue.
 
 mod absent;
 
@@ -78,7 +78,7 @@ unsafe extern "C" fn fmi3InstantiateCoSimulation(
     })
 }
 
-/// Makes no instance: returns NULL with a log message.
+/// Instantiates nothing: returns NULL with a log message.
 ///
 /// # Safety
 ///
@@ -98,7 +98,7 @@ unsafe extern "C" fn fmi3InstantiateModelExchange(
     ptr::null_mut()
 }
 
-/// Makes no instance: returns NULL with a log message.
+/// Instantiates nothing: returns NULL with a log message.
 ///
 /// # Safety
 ///
@@ -121,7 +121,7 @@ unsafe extern "C" fn fmi3InstantiateScheduledExecution(
     ptr::null_mut()
 }
 
-/// Frees an instance, in any mode; NULL is fine.
+/// Frees an instance in any mode; NULL is allowed.
 ///
 /// # Safety
 ///
@@ -132,7 +132,7 @@ unsafe extern "C" fn fmi3FreeInstance(instance: Instance) {
     unsafe { free(instance) }
 }
 
-/// Switches log categories on or off; none named means all.
+/// Enables or disables log categories; none named means all.
 ///
 /// # Safety
 ///
@@ -150,7 +150,7 @@ unsafe extern "C" fn fmi3SetDebugLogging(
     unsafe { guarded(instance, "fmi3SetDebugLogging", body) }
 }
 
-/// Takes start and stop time and goes to initialization mode; a tolerance is not needed.
+/// Sets the start and stop time and enters initialization mode; the tolerance is not used.
 ///
 /// # Safety
 ///
@@ -174,7 +174,7 @@ unsafe extern "C" fn fmi3EnterInitializationMode(
 
 plain! {
     Status;
-    /// Takes the parameters over and goes to step mode.
+    /// Applies the parameters and enters step mode.
     fmi3ExitInitializationMode => |handle| {
         handle.instance.exit_initialization_mode()?;
         handle.logger.event("initialized");
@@ -182,7 +182,7 @@ plain! {
     };
     /// Ends the run.
     fmi3Terminate => |handle| handle.instance.terminate();
-    /// Goes back to the instantiated state.
+    /// Returns to the instantiated state.
     fmi3Reset => |handle| {
         handle.instance.reset();
         handle.logger.event("reset");
@@ -219,7 +219,7 @@ macro_rules! values {
     )*};
 }
 
-/// An instance, where `Instance` is that of the standard.
+/// Our instance, since `Instance` is that of the standard.
 type Own = crate::instance::Instance;
 
 values! {
@@ -235,13 +235,13 @@ values! {
     fmi3SetFloat64(*const f64, slice) => Own::set_float64;
     /// Writes booleans.
     fmi3SetBoolean(*const Boolean, slice) => Own::set_bytes_of_booleans;
-    /// Writes counts: no count can be written.
+    /// Writes counts; no count is writable.
     fmi3SetInt32(*const i32, slice) => Own::set_int32;
-    /// Writes enumerations: none can be written.
+    /// Writes enumerations; none is writable.
     fmi3SetInt64(*const i64, slice) => Own::set_int64;
 }
 
-/// Defines the two derivatives. A seed or a sensitivity has a number for each element of its variables.
+/// Defines the two derivatives. A seed or a sensitivity has one number for each element of its variables.
 macro_rules! derivatives {
     ($($(#[$doc:meta])* $name:ident => $method:ident;)*) => {$(
         $(#[$doc])*
@@ -287,11 +287,11 @@ macro_rules! derivatives {
 derivatives! {
     /// Computes the derivatives of outputs along a direction of inputs.
     fmi3GetDirectionalDerivative => directional_derivative_of_arrays;
-    /// Computes the derivatives of a weighted sum of outputs by each element of inputs.
+    /// Computes the derivatives of a weighted sum of outputs with respect to each element of inputs.
     fmi3GetAdjointDerivative => adjoint_derivative;
 }
 
-/// Counts what an output depends on, element by element.
+/// Counts the dependencies of an output, element by element.
 ///
 /// # Safety
 ///
@@ -312,8 +312,8 @@ unsafe extern "C" fn fmi3GetNumberOfVariableDependencies(
     unsafe { guarded(instance, "fmi3GetNumberOfVariableDependencies", body) }
 }
 
-/// Tells what an output depends on: which of its elements, on which element of which variable. Indices count from 1, 0 is
-/// a scalar.
+/// Returns the dependencies of an output: which of its elements depends on which element of which variable.
+/// Indices count from 1; 0 denotes a scalar.
 ///
 /// # Safety
 ///
@@ -350,8 +350,8 @@ unsafe extern "C" fn fmi3GetVariableDependencies(
     unsafe { guarded(instance, "fmi3GetVariableDependencies", body) }
 }
 
-/// Makes a communication step; there are no events and no early returns. `noSetFMUStatePriorToCurrentPoint` is ignored:
-/// importers pass true while rolling back.
+/// Makes a communication step; there are no events and no early returns. `noSetFMUStatePriorToCurrentPoint`
+/// is ignored, since importers pass true while rolling back.
 ///
 /// # Safety
 ///

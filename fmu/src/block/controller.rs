@@ -1,4 +1,4 @@
-//! A nominal controller: from the state to the wanted input. Only waypoints remember anything: the present one.
+//! A nominal controller: maps the state to the wanted input. Only waypoints have a memory: the current one.
 
 use punctual_core::elementary;
 use punctual_core::jet::Tangent;
@@ -35,7 +35,7 @@ pub(super) struct ControllerBlock {
     parameters: Vec<Parameter<ControllerConfiguration>>,
     layout: Layout,
     expressions: Option<Expressions>,
-    /// The present point of `waypoints`, counted from 0. It is all that the block remembers.
+    /// The current point of `waypoints`, counted from 0, which is the whole memory of the block.
     waypoint: usize,
 }
 
@@ -48,7 +48,7 @@ impl ControllerBlock {
         Ok(Self { parameters: configuration.parameters(), configuration, layout, expressions, waypoint: 0 })
     }
 
-    /// The present point at the position of `x`: points that are reached are passed, except the last.
+    /// The current point at the position of `x`: points that are reached are passed, except the last.
     fn present(&self, x: &[f64]) -> usize {
         let mut present = self.waypoint;
         if let Controller::Waypoints { points, acceptance_radius, .. } = &self.configuration.controller {
@@ -62,9 +62,9 @@ impl ControllerBlock {
         present
     }
 
-    /// The wanted input at the inputs `x`: the state, and the goal behind it where that is an input. An input
-    /// that is not finite gives one that is not a number, which a filter or plant refuses by name. The limits
-    /// alone would make a number of it.
+    /// The wanted input for the inputs `x`: the state, followed by the goal if that is an input. An input
+    /// that is not finite gives NaN, which a filter or plant refuses by name. The limits alone would turn it
+    /// into a number.
     fn wanted<S: Scalar>(&self, x: impl Fn(usize) -> S, waypoint: usize) -> [S; INPUTS] {
         let c = &self.configuration;
         if (0..self.layout.states).any(|i| !x(i).value().is_finite()) {
@@ -82,10 +82,10 @@ impl ControllerBlock {
             Controller::Heading { drive, goal_input: true } => ([x(states), x(states + 1)], drive),
             Controller::Heading { drive, goal_input: false } => (drive.goal.map(S::from), drive),
             Controller::Waypoints { points, drive, .. } => (points[waypoint].map(S::from), drive),
-            // Those are computed by their expressions.
+            // Expressions are evaluated elsewhere.
             Controller::Expressions { .. } => return [S::from(f64::NAN); INPUTS],
         };
-        // The state as seen from the goal.
+        // The state relative to the goal.
         let heading = Heading { goal: [0.0; 2], ..*drive };
         let x = &[x(0) - goal[0], x(1) - goal[1], x(2), x(3)];
         match (c.plant.model(), c.plant.reference().and_then(ReferenceSection::l_r)) {
@@ -103,7 +103,7 @@ impl ControllerBlock {
         }
     }
 
-    /// Computes one sample at time `t`; returns the index of its point.
+    /// Computes one sample at time `t`; returns the index of its waypoint.
     fn sample(&mut self, t: f64, values: &mut Values) -> usize {
         let (inputs, outputs) = values.reals.split_at_mut(self.layout.outputs);
         if let Some(Expressions { functions, .. }) = &mut self.expressions {
@@ -164,7 +164,8 @@ impl Block for ControllerBlock {
     }
 
     fn save(&self, state: &mut BlockState) {
-        // Without `..`: a new field does not compile here until it is decided whether it belongs to the state.
+        // Without `..`, so that a new field does not compile until it is decided whether it belongs to the
+        // state.
         let Self { waypoint, configuration: _, parameters: _, layout: _, expressions: _ } = self;
         *state = BlockState::Controller { waypoint: u32::try_from(*waypoint).unwrap_or(u32::MAX) };
     }

@@ -1,22 +1,23 @@
-//! Disturbances of a plant: numbers that look random, each a function of seed, signal and time alone. Nothing is
-//! remembered between steps, so a state that is restored goes on bit for bit.
+//! Disturbances of a plant: pseudorandom numbers that depend only on seed, signal and time. Nothing is
+//! remembered between steps, so a restored state continues bit for bit.
 
 use crate::configuration::PlantConfiguration;
 
-/// Part of a period by which the time may fall short of its start: round-off in the importer's time.
+/// Fraction of a period by which the time may fall short of its start, to allow for round-off in the
+/// importer's time.
 const ROUND_OFF: f64 = 1e-6;
 
 /// Noise on the inputs and measurements of a plant.
 #[derive(Default)]
 pub(super) struct Disturbance {
     period: f64,
-    /// By input; empty without a disturbance.
+    /// By input; empty if there is no disturbance.
     inputs: Vec<f64>,
-    /// By state; empty without a disturbance.
+    /// By state; empty if there is no disturbance.
     measurements: Vec<f64>,
 }
 
-/// The two kinds of signals: their sequences differ.
+/// The two kinds of signals, which have different sequences.
 #[derive(Clone, Copy)]
 enum Kind {
     Input = 1,
@@ -39,22 +40,22 @@ impl Disturbance {
     }
 
     /// Whether it changes the inputs.
-    pub(super) fn is_of_inputs(&self) -> bool {
+    pub(super) fn affects_inputs(&self) -> bool {
         !self.inputs.is_empty()
     }
 
-    /// Adds to the inputs `u` the disturbance in force at time `t` (s) under `seed`.
-    pub(super) fn push(&self, seed: f64, t: f64, u: &mut [f64]) {
+    /// Adds to the inputs `u` the disturbance at time `t` (s) under `seed`.
+    pub(super) fn disturb(&self, seed: f64, t: f64, u: &mut [f64]) {
         self.add(Kind::Input, &self.inputs, seed, t, u);
     }
 
     /// Whether it changes the measurements.
-    pub(super) fn is_of_measurements(&self) -> bool {
+    pub(super) fn affects_measurements(&self) -> bool {
         !self.measurements.is_empty()
     }
 
-    /// Adds to the measurements `x` the disturbance in force at time `t` (s) under `seed`.
-    pub(super) fn blur(&self, seed: f64, t: f64, x: &mut [f64]) {
+    /// Adds to the measurements `x` the disturbance at time `t` (s) under `seed`.
+    pub(super) fn add_noise(&self, seed: f64, t: f64, x: &mut [f64]) {
         self.add(Kind::Measurement, &self.measurements, seed, t, x);
     }
 
@@ -68,7 +69,7 @@ impl Disturbance {
     }
 }
 
-/// A number in [−1, 1) that depends on `key` alone.
+/// A number in [−1, 1) that depends only on `key`.
 fn uniform(key: [u64; 4]) -> f64 {
     let bits = key.into_iter().fold(0, |state, word| mixed(state ^ word));
     // 53 bits, as many as a double has.
@@ -97,19 +98,19 @@ mod tests {
         let disturbance = example();
         let at = |t: f64| {
             let mut u = [1.0, 1.0];
-            disturbance.push(3.0, t, &mut u);
+            disturbance.disturb(3.0, t, &mut u);
             u
         };
         let all: Vec<f64> = (0..10_000).map(|k| at(0.1 * f64::from(k))[0] - 1.0).collect();
         assert!(all.iter().all(|w| w.abs() <= 2.0));
         let mean = all.iter().sum::<f64>() / 1e4;
         let square = all.iter().map(|w| w * w).sum::<f64>() / 1e4;
-        // A uniform number up to 2 has the mean 0 and the mean square 4/3. The mean of 10,000 of them has a
+        // A uniform number up to 2 has mean 0 and mean square 4/3. The mean of 10,000 of them has a standard
         // deviation of 0.012. The tolerance is five of these.
         assert!(mean.abs() < 0.06 && (square - 4.0 / 3.0).abs() < 0.06, "{mean}, {square}");
         let follow = all.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / 1e4;
         assert!(follow.abs() < 0.07, "one tells of the next: {follow}");
-        // An input without a bound keeps its value, and a disturbance lasts for its period.
+        // An input without a disturbance bound keeps its value, and a disturbance lasts for its period.
         assert_eq!((at(0.35)[1], at(0.35)), (1.0, at(0.3)));
         assert_ne!(at(0.3), at(0.4));
         assert_eq!(at(-0.05), at(-0.1));
@@ -117,13 +118,13 @@ mod tests {
 
     #[test]
     fn seeds_and_kinds_have_their_own_sequences() {
-        let drawn = |seed: f64, blur: bool| {
+        let drawn = |seed: f64, noisy: bool| {
             let mut x = [0.0];
             let disturbance = example();
-            if blur {
-                disturbance.blur(seed, 1.0, &mut x);
+            if noisy {
+                disturbance.add_noise(seed, 1.0, &mut x);
             } else {
-                disturbance.push(seed, 1.0, &mut x);
+                disturbance.disturb(seed, 1.0, &mut x);
             }
             x[0]
         };

@@ -1,4 +1,4 @@
-//! A filter: it samples its inputs and remembers its promises.
+//! A filter, which samples its inputs and remembers its promises.
 
 use punctual_core::filter::{
     Assurance, AssuranceStatus, BarrierReport, Filter, FilterState, NoDerivative, SampleDerivative, Status,
@@ -18,13 +18,13 @@ pub(super) struct FilterBlock {
     filter: Filter,
     /// The parameters that the filter was built with, and its state before the first step.
     built: (Vec<f64>, FilterState),
-    /// `rearm` at the last step: a rising edge re-arms.
+    /// `rearm` at the last step; a rising edge re-arms.
     rearm_seen: bool,
-    /// The status of the guarantee that was last logged.
+    /// The last status of the guarantee that was logged.
     noticed: Option<AssuranceStatus>,
-    /// Scratch: the state to go back to after looking ahead over a re-arming.
+    /// Buffer: the state to restore after looking ahead over a re-arming.
     kept: FilterState,
-    /// Scratch: the derivative of a sample.
+    /// Buffer: the derivative of a sample.
     change: SampleDerivative,
 }
 
@@ -66,13 +66,13 @@ impl FilterBlock {
         [x, &rest[..self.layout.inputs]]
     }
 
-    /// The same, and the place of the safe input.
+    /// The same, and the slots of the safe input.
     fn inputs_and_u<'a>(&self, reals: &'a mut [f64]) -> ([&'a [f64]; 2], &'a mut [f64]) {
         let (inputs, outputs) = reals.split_at_mut(self.layout.outputs);
         (self.inputs(inputs), &mut outputs[..self.layout.inputs])
     }
 
-    /// Re-arms where `values` has a rising edge; returns whether it did. The state before is in `kept`.
+    /// Re-arms if `values` has a rising edge; returns whether it did. The previous state is in `kept`.
     fn rearm(&mut self, values: &Values) -> bool {
         let rising = values.booleans[self.rearm_index()] && !self.rearm_seen;
         if rising {
@@ -82,31 +82,32 @@ impl FilterBlock {
         rising
     }
 
-    /// Expected time in s for which the input is held, where no step gives it.
+    /// Expected hold period of the input in s, if no step determines it.
     fn hold(&self) -> f64 {
         self.filter.last_hold().unwrap_or(self.configuration.experiment.step_size)
     }
 
-    /// Has the filter know for how long in s, > 0, the input of the next sample is held, where it counts with that.
+    /// Tells the filter for how long in s, > 0, the input of the next sample will be held, if the filter uses
+    /// that.
     fn expect(&mut self, hold: f64) -> Result<(), punctual_core::Error> {
         if self.filter.counts_holds() { self.filter.expect_hold(Some(hold)) } else { Ok(()) }
     }
 
-    /// Status of the guarantee, where plans are followed. They are not where a parameter that was set since asks for what
-    /// none accounts for.
+    /// Status of the guarantee, if plans are followed. They are not if a parameter has since been set to
+    /// something that plans do not support.
     fn assurance_status(&self) -> Option<AssuranceStatus> {
         let of = |assurance: &Assurance| assurance.status;
         let status = self.filter.assurance().map_or(AssuranceStatus::Refused, of);
         self.configuration.is_assured().then_some(status)
     }
 
-    /// The number of the output after those of the barriers.
+    /// The index of the output after those of the barriers.
     fn after_barriers(&self) -> usize {
         let barriers = self.configuration.barrier.len() * BARRIER_OUTPUTS.len();
         self.layout.outputs + self.layout.inputs + 1 + barriers
     }
 
-    /// The number of the output with the integral, which comes after what is said of plans.
+    /// The index of the output with the integral, which follows the outputs on plans.
     fn integral(&self) -> usize {
         let of_plans = 2 * usize::from(self.configuration.is_assured());
         self.after_barriers() + of_plans + usize::from(self.configuration.ends_plans())
@@ -137,7 +138,7 @@ impl FilterBlock {
         }
     }
 
-    /// The reason why there is no derivative, with the barrier by its name.
+    /// The reason why there is no derivative, with the barrier's name.
     fn named(&self, reason: NoDerivative) -> String {
         let barrier = match reason {
             NoDerivative::Source(i) | NoDerivative::Profile(i) => self.filter.barrier_names().nth(i),
@@ -188,7 +189,7 @@ impl Block for FilterBlock {
         let hold = self.hold();
         let expected = self.expect(hold);
         let ([x, u_ref], u) = self.inputs_and_u(&mut values.reals);
-        // The lengths are those of the filter by construction, since the table was built from it.
+        // The lengths match the filter by construction, since the table was built from it.
         let peeked = expected.and_then(|()| self.filter.peek(t, x, u_ref, u).map(drop));
         debug_assert!(peeked.is_ok(), "{peeked:?}");
         if peeked.is_ok() {
@@ -280,7 +281,8 @@ impl Block for FilterBlock {
     }
 
     fn save(&self, state: &mut BlockState) {
-        // Without `..`: a new field does not compile here until it is decided whether it belongs to the state.
+        // Without `..`, so that a new field does not compile until it is decided whether it belongs to the
+        // state.
         let Self {
             rearm_seen: now,
             filter,
@@ -324,7 +326,7 @@ impl Block for FilterBlock {
         for i in 0..inputs {
             let name = self.configuration.plant.input_name(i);
             let [min, max] = self.configuration.bounds.get(name).copied().unwrap_or_default();
-            // Not `clamp`, which panics where the bounds contradict each other.
+            // Not `clamp`, which panics if the bounds contradict each other.
             values.reals[outputs + i] = 0.0_f64.max(min).min(max);
         }
         if let Some(input) = self.filter.integrated_input() {
@@ -332,7 +334,7 @@ impl Block for FilterBlock {
         }
         let mut at = outputs + inputs;
         values.integers[at] = Status::InvalidInput as i32;
-        // No plan has 0 for its input.
+        // No plan contains the input 0, so no barrier is guaranteed.
         at += 1;
         for _ in &self.configuration.barrier {
             for (i, output) in (at..).zip(&BARRIER_OUTPUTS) {
@@ -359,7 +361,7 @@ fn write_barriers(reports: &[BarrierReport], at: usize, values: &mut Values) {
         let integers = values.integers[at..].first_chunk_mut();
         let booleans = values.booleans[at..].first_chunk_mut();
         let (Some(reals), Some(integers), Some(booleans)) = (reals, integers, booleans) else { return };
-        // Each row of the table is known where this is compiled, so that reading it costs nothing.
+        // Each row of the table is known at compile time, so that reading it costs nothing.
         macro_rules! write_rows {
             ($($row:literal)*) => {
                 const { assert!([$($row),*].len() == LEN) };

@@ -1,4 +1,4 @@
-//! The computation of an FMU, between arrays of values: a filter, a plant or a controller. No FMI, no pointers.
+//! The computation of an FMU on arrays of values: a filter, a plant or a controller. No FMI, no pointers.
 
 mod controller;
 mod disturbance;
@@ -47,7 +47,7 @@ impl Values {
     }
 }
 
-/// All that a block remembers besides its parameters.
+/// Everything that a block remembers besides its parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BlockState {
     /// State of a filter.
@@ -64,13 +64,13 @@ pub enum BlockState {
     },
     /// State of a controller.
     Controller {
-        /// The present waypoint, counted from 0.
+        /// The current waypoint, counted from 0.
         waypoint: u32,
     },
 }
 
 impl BlockState {
-    /// The message where a state of another kind is wanted.
+    /// The message if a state of another kind is needed.
     fn mismatch(&self, wanted: &str) -> String {
         let found = match self {
             Self::Filter { .. } => "filter",
@@ -83,20 +83,20 @@ impl BlockState {
 
 /// The computation behind an instance.
 pub trait Block: Send {
-    /// Takes over the parameters in `values` and returns to the state before the first step. May
-    /// allocate; the other functions may not.
+    /// Applies the parameters in `values` and returns to the state before the first step. May allocate; the
+    /// other functions must not.
     ///
     /// # Errors
     ///
     /// A parameter outside its range or parameters that contradict each other; nothing has changed.
     fn configure(&mut self, values: &Values) -> Result<(), ConfigurationError>;
 
-    /// Writes the outputs that belong to the inputs at time `t` (s), and remembers nothing.
+    /// Writes the outputs for the inputs at time `t` (s), without remembering anything.
     fn output(&mut self, t: f64, values: &mut Values);
 
-    /// Writes to `derivative` the change along `direction` of the real outputs that [`Self::output`] would write.
-    /// `direction` has a number for every real input; both are indexed by variables. `derivative` comes as zeros.
-    /// Nothing is remembered.
+    /// Writes to `derivative` the change along `direction` of the real outputs that [`Self::output`] would
+    /// write. `direction` has a number for every real input; both are indexed by variables. `derivative` is
+    /// initially zero. Nothing is remembered.
     ///
     /// # Errors
     ///
@@ -116,33 +116,33 @@ pub trait Block: Send {
     /// A step that cannot be made; nothing has changed.
     fn step(&mut self, t: f64, h: f64, values: &mut Values) -> Result<(), String>;
 
-    /// What the user should know of the last step, if there is anything; said once.
+    /// A notice to the user on the last step, if there is one; given once.
     fn notice(&mut self) -> Option<String> {
         None
     }
 
-    /// Writes all that is remembered to `state`; allocates only where that was of another kind or size.
+    /// Writes everything that is remembered to `state`; only allocates if that was of another kind or size.
     fn save(&self, state: &mut BlockState);
 
-    /// Goes back to the state that [`Self::save`] wrote under the same parameters: every bit that follows is the
-    /// same.
+    /// Returns to the state that [`Self::save`] wrote under the same parameters. Everything that follows is
+    /// bitwise the same.
     ///
     /// # Errors
     ///
     /// The state of another product; nothing has changed.
     fn restore(&mut self, state: &BlockState) -> Result<(), String>;
 
-    /// Whether outputs depend on inputs without a step between.
+    /// Whether outputs depend on inputs without a step in between.
     fn direct_feedthrough(&self) -> bool;
 
-    /// Whether a step may start later than the last one ended.
+    /// Whether a step may start after the end of the previous one.
     fn accepts_gaps(&self) -> bool;
 
-    /// Shows in the outputs that a step was refused, where they can show it.
+    /// Shows in the outputs that a step was refused, if they can show it.
     fn show_refusal(&self, values: &mut Values);
 }
 
-/// The reason why the core refuses a step. Out of the way, since it does so where it is misused alone.
+/// The reason why the core refuses a step. It is out of line, since this only happens on misuse.
 #[cold]
 fn in_words(error: &punctual_core::Error) -> String {
     error.to_string()

@@ -1,4 +1,4 @@
-//! A plant: holds its state and integrates it under held inputs.
+//! A plant, which integrates its state under held inputs.
 
 use punctual_core::dynamics::DynPlant;
 use punctual_models::Functions;
@@ -8,8 +8,8 @@ use super::{Block, BlockState, Values, in_words};
 use crate::configuration::{ConfigurationError, Parameter, PlantConfiguration, PlantSection, updated};
 use crate::product::Layout;
 
-/// Most Runge-Kutta steps in one communication step. A number beyond it is a mistake in the step sizes, and would
-/// look like a hang.
+/// The most Runge–Kutta steps in one communication step. A larger number is a mistake in the step sizes, and
+/// would look like a hang.
 const MOST_SUBSTEPS: f64 = 1e8;
 
 pub(super) struct PlantBlock {
@@ -17,15 +17,15 @@ pub(super) struct PlantBlock {
     parameters: Vec<Parameter<PlantConfiguration>>,
     layout: Layout,
     plant: Box<dyn DynPlant>,
-    /// What is output beside the states, if anything is.
+    /// Further outputs besides the states, if any.
     outputs: Option<Functions<f64>>,
     disturbance: Disturbance,
-    /// Place of the disturbance's seed among the parameters: it may change in a run.
+    /// Index of the disturbance's seed among the parameters, since it may change during a run.
     seed: Option<usize>,
     x: Vec<f64>,
-    /// Scratch: the state after the step under way.
+    /// Buffer: the state after the current step.
     next: Vec<f64>,
-    /// Scratch: the inputs with their disturbance.
+    /// Buffer: the inputs with their disturbance.
     u: Vec<f64>,
 }
 
@@ -54,7 +54,7 @@ impl PlantBlock {
         self.seed.map_or(0.0, |place| values.reals[self.layout.parameters + place])
     }
 
-    /// The reason why there is no step from `t` (s) under the inputs `u`, of which one is not finite.
+    /// The reason for refusing a step from `t` (s) under the inputs `u`, one of which is not finite.
     #[cold]
     fn refused_input(&self, u: &[f64], t: f64) -> String {
         let i = not_finite(u);
@@ -62,7 +62,7 @@ impl PlantBlock {
         format!("u.{name} is {}, must be finite for a step from t = {t}", u[i])
     }
 
-    /// The reason why there is no step of `h` s, which would take so many inner ones.
+    /// The reason for refusing a step of `h` s, which would take this many inner steps.
     #[cold]
     fn too_many(&self, substeps: f64, h: f64) -> String {
         let inner = self.configuration.integration.inner_step;
@@ -71,7 +71,7 @@ impl PlantBlock {
         )
     }
 
-    /// The reason why the step from `t` by `h` (s) fails, after which one of the states is not finite.
+    /// The reason why the step from `t` by `h` (s) fails, after which a state is not finite.
     #[cold]
     fn lost_state(&self, t: f64, h: f64) -> String {
         let i = not_finite(&self.next);
@@ -93,7 +93,7 @@ impl PlantBlock {
         self.outputs.as_mut().and_then(at)
     }
 
-    /// The reason why that step fails, after which the output `i` is not finite.
+    /// The reason why the step fails, after which the output `i` is not finite.
     #[cold]
     fn lost_output(&self, i: usize, value: f64, t: f64, h: f64) -> String {
         let output = &self.configuration.output[i];
@@ -104,7 +104,7 @@ impl PlantBlock {
     }
 }
 
-/// The first of `numbers` that is not finite; one of them is not.
+/// The index of the first of `numbers` that is not finite; there must be one.
 fn not_finite(numbers: &[f64]) -> usize {
     numbers.iter().position(|v| !v.is_finite()).unwrap_or(0)
 }
@@ -127,15 +127,15 @@ impl Block for PlantBlock {
         let reported = &mut values.reals[self.layout.outputs..self.layout.parameters];
         let (measured, others) = reported.split_at_mut(self.layout.states);
         measured.copy_from_slice(&self.x);
-        if self.disturbance.is_of_measurements() {
-            self.disturbance.blur(seed, t, measured);
+        if self.disturbance.affects_measurements() {
+            self.disturbance.add_noise(seed, t, measured);
         }
         if let Some(outputs) = &mut self.outputs {
             others.iter_mut().zip(outputs.at(t, |i| self.x[i])).for_each(|(to, value)| *to = value);
         }
     }
 
-    /// The state does not depend on the inputs before a step.
+    /// Without a step, the state does not depend on the inputs.
     fn differentiate(
         &mut self,
         _t: f64,
@@ -158,9 +158,9 @@ impl Block for PlantBlock {
         self.next.copy_from_slice(&self.x);
         let (inner, mut k) = (h / substeps, 0.0);
         while k < substeps {
-            let held = if self.disturbance.is_of_inputs() {
+            let held = if self.disturbance.affects_inputs() {
                 self.u.copy_from_slice(u);
-                self.disturbance.push(self.seed(values), t + k * inner, &mut self.u);
+                self.disturbance.disturb(self.seed(values), t + k * inner, &mut self.u);
                 &self.u
             } else {
                 u
@@ -180,8 +180,8 @@ impl Block for PlantBlock {
     }
 
     fn save(&self, state: &mut BlockState) {
-        // Without `..`: a new field does not compile here until it is decided whether it belongs to the state. A
-        // disturbance does not: it is a function of time.
+        // Without `..`, so that a new field does not compile until it is decided whether it belongs to the
+        // state. A disturbance does not, since it is a function of time.
         let Self {
             x: now,
             configuration: _,
@@ -220,7 +220,7 @@ impl Block for PlantBlock {
     }
 
     fn show_refusal(&self, _values: &mut Values) {
-        // The state of a plant has no value that shows a refusal. The next step is refused too, because time
-        // stands still.
+        // No value in the state of a plant shows a refusal. The next step is refused too, because the time
+        // does not advance.
     }
 }

@@ -1,4 +1,4 @@
-//! The value references that may be read and written.
+//! Checks the value references that are read and written.
 
 use punctual_modeldescription::{BaseType, Causality, Variability, Variable};
 
@@ -31,7 +31,7 @@ impl Instance {
         references: &[u32],
         allowed: impl Fn(Causality, Variability) -> bool,
     ) -> Result<(), Failure> {
-        // Reads the small table, since this is done at every step; only the message looks at the variables
+        // Reads the compact table, since this is done at every step; only the message needs the variables
         // themselves.
         let fits = |reference: u32| {
             let kind = self.kinds.get(reference as usize);
@@ -55,7 +55,7 @@ impl Instance {
         }
     }
 
-    /// The real, integer, … with this value reference.
+    /// The real, integer, … variable with this value reference.
     pub(super) fn variable(&self, base: BaseType, reference: u32) -> Result<&Variable, Failure> {
         let variables = &self.product.variables;
         let variable = variables.get(reference as usize).ok_or_else(|| {

@@ -1,11 +1,11 @@
-//! Values by the value references of FMI 3.0: single ones, and arrays as runs.
+//! Access to values by the value references of FMI 3.0: scalars, and arrays as consecutive scalars.
 
 use punctual_modeldescription::{Causality, ScalarType, Variability};
 
 use super::{Call, Failure, Instance, Mode};
 use crate::product::Access;
 
-/// The type of a variable as FMI 3.0 names it: its functions are `fmi3Get<type>` and `fmi3Set<type>`.
+/// The type of a variable as named in FMI 3.0; its functions are `fmi3Get<type>` and `fmi3Set<type>`.
 pub(crate) fn type_name(scalar: ScalarType) -> &'static str {
     match scalar {
         ScalarType::Real => "Float64",
@@ -16,7 +16,7 @@ pub(crate) fn type_name(scalar: ScalarType) -> &'static str {
     }
 }
 
-/// The scalars of variables, by their index. The references are known.
+/// The scalars of variables, by their index. The references must be valid.
 pub(super) fn scalars<'a>(
     accesses: &'a [Access],
     references: &'a [u32],
@@ -32,7 +32,8 @@ impl Instance {
     ///
     /// # Errors
     ///
-    /// A value reference that is not one of such a variable; another number of values than the variables have.
+    /// A value reference that is not that of such a variable; a number of values other than the variables
+    /// have.
     pub fn get_float64(&mut self, references: &[u32], out: &mut [f64]) -> Result<(), Failure> {
         self.check_runs(Call::Get, ScalarType::Real, references, out.len())?;
         self.refresh();
@@ -42,7 +43,7 @@ impl Instance {
             let (to, others) = rest.split_at_mut(self.accesses[first].length as usize);
             match self.values.reals.get(first..first + to.len()) {
                 Some(values) => to.copy_from_slice(values),
-                // What FMI 2.0 does not have: the time.
+                // The time, which FMI 2.0 does not have as a variable.
                 None => to.fill(self.time),
             }
             rest = others;
@@ -54,7 +55,7 @@ impl Instance {
     ///
     /// # Errors
     ///
-    /// As of [`Self::get_float64`].
+    /// Those of [`Self::get_float64`].
     pub fn get_int32(&mut self, references: &[u32], out: &mut [i32]) -> Result<(), Failure> {
         self.check_runs(Call::Get, ScalarType::Integer, references, out.len())?;
         self.refresh();
@@ -67,7 +68,7 @@ impl Instance {
     ///
     /// # Errors
     ///
-    /// As of [`Self::get_float64`].
+    /// Those of [`Self::get_float64`].
     pub fn get_int64(&mut self, references: &[u32], out: &mut [i64]) -> Result<(), Failure> {
         self.check_runs(Call::Get, ScalarType::Enumeration, references, out.len())?;
         self.refresh();
@@ -80,7 +81,7 @@ impl Instance {
     ///
     /// # Errors
     ///
-    /// As of [`Self::get_float64`].
+    /// Those of [`Self::get_float64`].
     pub fn get_bytes_of_booleans(&mut self, references: &[u32], out: &mut [u8]) -> Result<(), Failure> {
         self.check_runs(Call::Get, ScalarType::Boolean, references, out.len())?;
         self.refresh();
@@ -93,7 +94,7 @@ impl Instance {
     ///
     /// # Errors
     ///
-    /// As there; another number of values than the variables have.
+    /// Those of [`Self::set_real`]; a number of values other than the variables have.
     pub fn set_float64(&mut self, references: &[u32], values: &[f64]) -> Result<(), Failure> {
         self.check_runs(Call::Set, ScalarType::Real, references, values.len())?;
         if references.iter().any(|&reference| reference as usize >= self.product.layout.parameters) {
@@ -116,8 +117,8 @@ impl Instance {
     ///
     /// # Errors
     ///
-    /// The wrong mode; a reference that is not one of a boolean input; another number of values than the variables
-    /// have.
+    /// The wrong mode; a reference that is not that of a boolean input; a number of values other than the
+    /// variables have.
     pub fn set_bytes_of_booleans(&mut self, references: &[u32], values: &[u8]) -> Result<(), Failure> {
         self.check_runs(Call::Set, ScalarType::Boolean, references, values.len())?;
         let Self { accesses, values: own, .. } = self;
@@ -144,12 +145,13 @@ impl Instance {
         self.check_runs(Call::Set, ScalarType::Enumeration, references, values.len())
     }
 
-    /// What the variable `dependent` depends on: an element of it, a variable, and an element of that. Elements count
-    /// from 1; 0 is a scalar. Before the end of initialization that is what its first value depends on.
+    /// The dependencies of the variable `dependent`: an element of it, a variable, and an element of that.
+    /// Elements count from 1; 0 denotes a scalar. Before the end of initialization, these are the
+    /// dependencies of its first value.
     ///
     /// # Errors
     ///
-    /// A reference that is none of an output.
+    /// A reference that is not that of an output.
     pub fn dependencies(
         &self,
         dependent: u32,
@@ -192,8 +194,8 @@ impl Instance {
         }
     }
 
-    /// Checks that each of `references` is a variable of the type `scalar` that `call` may touch now, and that they have
-    /// `count` values in all.
+    /// Checks that each of `references` is a variable of the type `scalar` that `call` may access now, and
+    /// that they have `count` values in total.
     fn check_runs(
         &self,
         call: Call,
@@ -260,7 +262,7 @@ impl Instance {
     }
 }
 
-/// Checks the number of values given against that of the variables.
+/// Checks that the number of values given is that of the variables.
 fn check_count(found: usize, wanted: usize) -> Result<(), Failure> {
     if found == wanted {
         return Ok(());

@@ -9,14 +9,15 @@ use super::{Call, Failure, Instance, Mode};
 const SIDES: [(Causality, &str); 2] = [(Causality::Output, "unknown"), (Causality::Input, "known")];
 
 impl Instance {
-    /// Writes the derivatives of the outputs `unknowns` along `seed`, one number for each of the inputs `knowns`.
-    /// They are those of the outputs that would be read now had these inputs just been set, with the units of the
-    /// output over those of the input. Changes no value, and does not allocate once configured but for plans.
+    /// Writes the derivatives of the outputs `unknowns` along `seed`, which has one number for each of the
+    /// inputs `knowns`. They are those of the outputs that would be read now had these inputs just been set,
+    /// in the unit of the output over that of the input. Changes no value and, once configured, allocates
+    /// only for plans.
     ///
     /// # Errors
     ///
-    /// The wrong mode; an unknown that is no real output, a known that is no real input; a seed that is not
-    /// finite; parameters that contradict each other; a derivative that is not known or not finite.
+    /// The wrong mode; an unknown that is not a real output, or a known that is not a real input; a seed that
+    /// is not finite; contradictory parameters; a derivative that is unknown or not finite.
     pub fn directional_derivative(
         &mut self,
         unknowns: &[u32],
@@ -41,12 +42,13 @@ impl Instance {
         Ok(())
     }
 
-    /// [`Self::directional_derivative`] for variables of FMI 3.0: seed and result have a number for each element.
-    /// The inner error: the derivative is not known or not finite here, and nothing was misused.
+    /// [`Self::directional_derivative`] for variables of FMI 3.0; seed and result have a number for each
+    /// element. The inner error means that the derivative is unknown or not finite here, without any misuse.
     ///
     /// # Errors
     ///
-    /// As there; another length of seed or result than the variables have.
+    /// Those of [`Self::directional_derivative`]; a length of seed or result that differs from the
+    /// variables'.
     pub fn directional_derivative_of_arrays(
         &mut self,
         unknowns: &[u32],
@@ -66,14 +68,14 @@ impl Instance {
         Ok(known)
     }
 
-    /// Writes to `out` the sum of the derivatives of the outputs `unknowns` by each element of the inputs `knowns`,
-    /// weighted by `seed`: the transposed Jacobian times the seed. The Jacobian is the one of
-    /// [`Self::directional_derivative`], of which one is taken for each element. Changes and allocates as little.
-    /// The inner error is that of [`Self::directional_derivative_of_arrays`].
+    /// Writes to `out` the sum of the derivatives of the outputs `unknowns` with respect to each element of
+    /// the inputs `knowns`, weighted by `seed`: the transposed Jacobian times the seed. It takes one
+    /// [`Self::directional_derivative`] for each element. It changes no value and allocates as little. The
+    /// inner error is that of [`Self::directional_derivative_of_arrays`].
     ///
     /// # Errors
     ///
-    /// As of [`Self::directional_derivative_of_arrays`].
+    /// Those of [`Self::directional_derivative_of_arrays`].
     pub fn adjoint_derivative(
         &mut self,
         unknowns: &[u32],
@@ -96,7 +98,8 @@ impl Instance {
         Ok(Ok(()))
     }
 
-    /// Computes the derivatives of `unknowns` by the number `k`, and keeps their sum, weighted by `seed`.
+    /// Computes the derivatives of `unknowns` with respect to the number `k`, and stores their sum, weighted
+    /// by `seed`.
     fn gather(&mut self, unknowns: &[u32], k: usize, seed: &[f64]) -> Result<(), Failure> {
         self.derivative[0].fill(0.0);
         self.derivative[0][k] = 1.0;
@@ -140,21 +143,22 @@ impl Instance {
         Err(format!("the seed of {name} is {}, must be finite", seed[i]))
     }
 
-    /// Differentiates along the direction that is there.
+    /// Differentiates along the direction that was set.
     fn differentiate(&mut self) -> Result<(), Failure> {
         if !self.configured {
             self.configure().map_err(|e| e.to_string())?;
         }
         let [direction, derivative, _] = &mut self.derivative;
         derivative.fill(0.0);
-        // After initialization outputs without direct feedthrough change in steps only.
+        // After initialization, outputs without direct feedthrough change only in steps.
         if self.mode == Mode::INITIALIZATION || self.block.direct_feedthrough() {
             self.block.differentiate(self.time, &self.values, direction, derivative)?;
         }
         Ok(())
     }
 
-    /// Checks that the derivatives of the variables `indices` are finite: finite numbers are handed out, or none.
+    /// Checks that the derivatives of the variables `indices` are finite: either all numbers returned are
+    /// finite, or none is returned.
     fn check_finite(&self, mut indices: impl Iterator<Item = usize>) -> Result<(), Failure> {
         match indices.find(|&i| !self.derivative[1][i].is_finite()) {
             None => Ok(()),
@@ -166,7 +170,7 @@ impl Instance {
     }
 }
 
-/// The one direction that the seeds of the variables `indices` make.
+/// Writes the direction that consists of the seeds of the variables `indices`.
 fn seed_direction(direction: &mut [f64], indices: impl Iterator<Item = usize>, seed: &[f64]) {
     direction.fill(0.0);
     indices.zip(seed).for_each(|(i, seed)| direction[i] += seed);

@@ -1,12 +1,12 @@
-//! Inputs and outputs that a master in this process passes on at every step: found once, then read and written without
-//! a look at their types.
+//! Fast access for a master in this process that passes the same inputs and outputs at every step. They are
+//! looked up once, then read and written without checking their types.
 
 use punctual_modeldescription::{BaseType, Causality};
 
 use super::{Call, Failure, Instance};
 use crate::block::Values;
 
-/// Where an instance keeps an input or output: the index in the array of its type.
+/// The storage place of an input or output: the index in the array of its type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// Of a real.
@@ -18,7 +18,7 @@ pub enum Place {
 }
 
 impl Instance {
-    /// Where it keeps the input or output `reference`; `None` where that is of another type or causality.
+    /// The storage place of the input or output `reference`; `None` if its type or causality differs.
     pub fn place(&self, causality: Causality, base: BaseType, reference: u32) -> Option<Place> {
         let index = reference as usize;
         let &(found, c, _) = self.kinds.get(index)?;
@@ -32,7 +32,7 @@ impl Instance {
         }
     }
 
-    /// Reads the numbers at `places`, which it reported itself. A boolean is 0 or 1.
+    /// Reads the numbers at `places`, which [`Self::place`] returned. A boolean is 0 or 1.
     ///
     /// # Errors
     ///
@@ -52,7 +52,8 @@ impl Instance {
         Ok(())
     }
 
-    /// Writes numbers to `places`, which it reported itself as those of inputs. What is 0 as a whole number is false.
+    /// Writes numbers to `places`, which [`Self::place`] returned for inputs. A boolean is false if the
+    /// number truncates to 0.
     ///
     /// # Errors
     ///

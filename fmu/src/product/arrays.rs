@@ -1,7 +1,7 @@
-//! The variables of FMI 3.0: single ones of the table, and runs of it as arrays.
+//! The variables of FMI 3.0: scalars of the table, and consecutive scalars as arrays.
 //!
-//! The value reference of an array is the index of its first scalar, so that a read or write is a run over the
-//! same values. After the table comes what FMI 2.0 does not have: the time.
+//! The value reference of an array is the index of its first scalar, so that a read or write accesses a range
+//! of the same values. The time, which FMI 2.0 does not have as a variable, comes after the table.
 
 use std::ops::Range;
 
@@ -12,16 +12,16 @@ use super::Layout;
 /// A variable of FMI 3.0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Item {
-    /// Its name: that of the scalar, or what the names of the scalars have in common.
+    /// Its name: that of the scalar, or the common part of the scalars' names.
     pub name: String,
     /// The scalars, by their index; the time comes after the table.
     pub scalars: Range<usize>,
-    /// The lengths of the array, the last one running fastest; none for a scalar.
+    /// The lengths of the array, with the last dimension varying fastest; empty for a scalar.
     pub dimensions: Vec<usize>,
 }
 
 impl Item {
-    /// The variable that is number `index` by itself.
+    /// The variable that consists of the scalar `index`.
     fn scalar(name: &str, index: usize) -> Self {
         Self { name: name.to_owned(), scalars: index..index + 1, dimensions: Vec::new() }
     }
@@ -31,28 +31,28 @@ impl Item {
         self.scalars.start as u32
     }
 
-    /// The position of the scalar `index` in the array, from 1; 0 in a variable that is no array.
+    /// The position of the scalar `index` in the array, from 1; 0 if the variable is not an array.
     pub fn element(&self, index: usize) -> usize {
         if self.dimensions.is_empty() { 0 } else { index + 1 - self.scalars.start }
     }
 }
 
-/// What an importer of FMI 3.0 may do with a value reference.
+/// The access that an importer of FMI 3.0 has to a value reference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Access {
-    /// The type, which tells the functions that read and write it.
+    /// The type, which determines the functions that read and write it.
     pub(crate) scalar: ScalarType,
     pub(crate) causality: Causality,
     pub(crate) variability: Variability,
-    /// The number of values; 0 where no variable begins.
+    /// The number of values; 0 if no variable begins here.
     pub(crate) length: u32,
 }
 
 /// The name of the independent variable.
 pub const TIME: &str = "time";
 
-/// What the names of scalars of one family have before the last dot, where that becomes an array; and the number of
-/// elements that it must have, where some may be missing. A bound is an array where each of the `inputs` has it.
+/// The part before the last dot in the names of scalars that form an array, if they do; and the number of
+/// elements that it must have, if some may be missing. Bounds form an array if each of the `inputs` has one.
 fn family(name: &str, inputs: usize) -> Option<(&str, Option<usize>)> {
     let (family, _) = name.rsplit_once('.')?;
     match family {
@@ -69,7 +69,7 @@ fn element(name: &str) -> Option<(&str, Vec<usize>)> {
     Some((array, indices))
 }
 
-/// The array that begins at the scalar `first`, if one does.
+/// The array that begins at the scalar `first`, if any.
 fn array_at(variables: &[Variable], first: usize, inputs: usize) -> Option<Item> {
     let start = &variables[first];
     let alike = |v: &Variable| {
@@ -91,17 +91,17 @@ fn array_at(variables: &[Variable], first: usize, inputs: usize) -> Option<Item>
     let (name, indices) = element(&start.name)?;
     let length = run(&|other| element(other).is_some_and(|(found, _)| found == name));
     let (_, dimensions) = element(&variables[first + length - 1].name)?;
-    // Only where the table has every element, from the first to the last.
+    // Only if the table has every element, from the first to the last.
     let whole = indices.iter().all(|index| *index == 1) && dimensions.iter().product::<usize>() == length;
     whole.then(|| Item { name: name.to_owned(), scalars: first..first + length, dimensions })
 }
 
-/// The variables of FMI 3.0 over the table `variables`, with arrays or without; then the time.
+/// The variables of FMI 3.0 made from the table `variables`, with or without arrays; then the time.
 pub(super) fn items(variables: &[Variable], layout: &Layout, arrays: bool) -> Vec<Item> {
     let mut items = Vec::new();
     let mut next = 0;
     while next < variables.len() {
-        // The limits of an integrated input are called like the bounds of the others, and come after them.
+        // The limits of an integrated input are named like the bounds of the others, and come after them.
         let is_new = |item: &Item| items.iter().all(|other: &Item| other.name != item.name);
         let array = arrays.then(|| array_at(variables, next, layout.inputs)).flatten().filter(is_new);
         let item = array.unwrap_or_else(|| Item::scalar(&variables[next].name, next));
@@ -112,7 +112,7 @@ pub(super) fn items(variables: &[Variable], layout: &Layout, arrays: bool) -> Ve
     items
 }
 
-/// What may be done with each value reference of FMI 3.0.
+/// The access to each value reference of FMI 3.0.
 pub(crate) fn accesses(variables: &[Variable], items: &[Item]) -> Vec<Access> {
     let scalars = items.last().map_or(0, |item| item.scalars.end);
     let mut accesses: Vec<_> = (0..scalars)

@@ -1,4 +1,4 @@
-//! The model description of FMI 3.0, from that of FMI 2.0 and the arrays.
+//! Derives the model description of FMI 3.0 from that of FMI 2.0 and the arrays.
 
 use punctual_modeldescription::fmi3::{
     CoSimulation, Dimension, EnumerationItem, Float, Integer, Interface, ModelDescription, ModelStructure,
@@ -57,8 +57,8 @@ impl Product {
         }
     }
 
-    /// The terminals: `vehicle` joins plant, filter and controller, `wanted` a controller and a filter. Each matches what
-    /// the other one has of its members.
+    /// The terminals: `vehicle` connects plant, filter and controller, `wanted` a controller and a filter.
+    /// They match by the members that both sides have.
     pub fn terminals(&self) -> Terminals {
         let vehicle = ("vehicle", "the state measured, and the input");
         let wanted = ("wanted", "the input that is wanted");
@@ -84,7 +84,7 @@ impl Product {
         Terminals { terminals: groups.iter().map(terminal).filter(|t| !t.members.is_empty()).collect() }
     }
 
-    /// Fills in what `unknown` depends on: what any of its scalars does, by `dependencies`.
+    /// Adds the dependencies of `unknown`: those of any of its scalars, as given by `dependencies`.
     fn depend(&self, unknown: &mut Unknown, dependencies: impl Fn(&fmi2::Variable) -> Option<&Vec<u32>>) {
         let Some(scalars) =
             self.variables.get(self.item_of(unknown.value_reference as usize).scalars.clone())
@@ -140,13 +140,13 @@ fn units(variables: &[Variable]) -> Vec<fmi2::Unit> {
     super::units(variables.iter().filter_map(|v| v.kind.as_float()?.unit.as_deref()))
 }
 
-/// What all have in common; nothing where one differs.
+/// The common value of all; `None` if they differ.
 fn common<T: PartialEq>(mut all: impl Iterator<Item = Option<T>>) -> Option<T> {
     let first = all.next()??;
     all.all(|other| other.as_ref() == Some(&first)).then_some(first)
 }
 
-/// The type of one or more scalars, all of the same type, with unit and range where they share them.
+/// The type of one or more scalars of the same type, with unit and range if they share them.
 fn kind(scalars: &[fmi2::Variable]) -> VariableKind {
     let integer = |of: &fmi2::Integer| Integer {
         quantity: of.quantity.clone(),
@@ -182,7 +182,7 @@ fn kind(scalars: &[fmi2::Variable]) -> VariableKind {
     }
 }
 
-/// The meaning of a scalar, or of each element of an array with its name and unit.
+/// The description of a scalar; for an array, that of each element with its name and unit.
 fn description(item: &Item, scalars: &[fmi2::Variable]) -> String {
     if item.dimensions.is_empty() {
         return scalars[0].description.clone();

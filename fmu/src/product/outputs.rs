@@ -8,13 +8,13 @@ use crate::configuration::Unit::{self, Is, OfH, OfHighestDerivative};
 pub struct BarrierOutput {
     /// The variable's name after `<barrier>.`.
     pub name: &'static str,
-    /// Meaning, for a human.
+    /// Meaning, as a text for the reader.
     pub description: &'static str,
     /// The type, and the source of the value.
     pub reading: Reading,
 }
 
-/// The type of an output, and its value in a step's report.
+/// The type of an output, and how its value is read from a step's report.
 pub enum Reading {
     /// A number, its unit, and its derivative along a direction of the inputs.
     Real(Unit, fn(&BarrierReport) -> f64, fn(&BarrierDerivative) -> f64),

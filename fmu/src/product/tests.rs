@@ -17,7 +17,7 @@ fn product(text: &str) -> Product {
     Product::new(configuration).unwrap()
 }
 
-/// Every model, as plant and as filter with either shape, method and feedthrough.
+/// Every model, as a plant, and as a filter with either shape, method and feedthrough.
 fn every_product() -> Vec<Product> {
     let mut products = Vec::new();
     for model in ["bicycle_small_slip", "bicycle_kinematic_angle", "bicycle_kinematic_slip"] {
@@ -39,7 +39,7 @@ fn every_product() -> Vec<Product> {
             }
         }
     }
-    // One input, whose limits are called like bounds.
+    // One input, whose limits are named like bounds.
     for limits in ["", "integrator.min = -1\nintegrator.max = 2\n"] {
         products.push(product(&format!(
             "kind = \"filter\"\nintegrator.state = \"a\"\n{limits}[plant]\nderivatives = {{ p = \"v\", v = \"a\", a = \"j\" }}\n\
@@ -51,7 +51,7 @@ fn every_product() -> Vec<Product> {
     products
 }
 
-/// Every controller along every model that has it.
+/// Every controller with every model that supports it.
 fn controllers() -> Vec<String> {
     let mut texts = Vec::new();
     for model in ["point_mass", "unicycle", "bicycle", "bicycle_small_slip", "bicycle_kinematic_slip"] {
@@ -183,7 +183,7 @@ fn dependencies_say_whether_outputs_follow_inputs_at_once() {
     }
 }
 
-/// The dependencies of a controller's outputs, by name, are those found by changing one input at a time.
+/// The declared dependencies of a controller's outputs are those found by changing one input at a time.
 #[test]
 fn dependencies_of_controllers_are_those_found() {
     for text in controllers() {
@@ -196,7 +196,7 @@ fn dependencies_of_controllers_are_those_found() {
                 *value = start;
             }
         }
-        // With small speeds and a near goal no limit is active.
+        // With small speeds and a near goal, no limit is active.
         values.reals[..product.layout.states.min(4)].copy_from_slice(&[0.9, 2.1, 0.3, 0.2]);
         block.configure(&values).unwrap();
         let mut sampled = |values: &mut crate::block::Values| {
@@ -228,7 +228,7 @@ fn enumerations_cover_every_status_and_phase() {
     assert_eq!(names.len(), Status::ALL.len(), "{names:?}");
 }
 
-/// Importers that drop enumerations find the same numbers as integers, after all that was there before.
+/// Importers that drop enumerations find the same numbers as integers, after all other variables.
 #[test]
 fn every_enumeration_has_an_integer_twin() {
     let bounds = "bounds = { u_x = [-8, 8], u_y = [-8, 8] }\n";
@@ -241,7 +241,7 @@ fn every_enumeration_has_an_integer_twin() {
     assert!(twins.iter().all(|v| matches!(v.kind, VariableKind::Integer(_))));
 }
 
-/// One valid change per field gives another GUID each, and no two the same.
+/// One valid change per field gives a different GUID each, and no two of them are equal.
 #[test]
 fn the_guid_differs_when_any_field_differs() {
     let filter = format!("kind = \"filter\"\nplant.model = \"bicycle\"\n{BARRIER}");
@@ -315,7 +315,7 @@ fn no_variable_is_called_time() {
     }
 }
 
-/// The integrated state is no input, and stands where its rate would.
+/// The integrated state is not an input, and takes the place of its rate.
 #[test]
 fn an_integrated_state_is_commanded_and_not_measured() {
     let product = product(STEERED);
@@ -341,7 +341,8 @@ fn every_product_of_fmi3() -> impl Iterator<Item = (Product, Product)> {
     })
 }
 
-/// The description can be written, which checks it by the rules of the standard, and says what the table says.
+/// The description can be written, which checks it against the rules of the standard, and agrees with the
+/// table.
 #[test]
 fn descriptions_of_fmi3() {
     for (old, new) in every_product_of_fmi3() {
@@ -399,7 +400,7 @@ fn units_and_ranges_that_all_elements_share() {
     assert_eq!(of("u").unit.as_deref(), Some("m/s"));
 }
 
-/// A plant with an output beside its states.
+/// A plant with an output besides its states.
 const TANK: &str = "kind = \"plant\"\noutput = [{ name = \"twice\", expression = \"2*a\", unit = \"m\" }]\n[plant]\n\
                     states = [{ name = \"a\", unit = \"m\" }, { name = \"b\", unit = \"rad/s\" }]\n\
                     inputs = [{ name = \"u\", unit = \"m/s\" }]\nparameters = [{ name = \"w\", unit = \"1/s\", start = 2.0 }]\nderivatives = { a = \"u\", b = \"-w*b\" }\n";

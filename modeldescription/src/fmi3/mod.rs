@@ -5,7 +5,7 @@
 //! | `variable` | variables of fifteen types, scalars and arrays, with aliases |
 //! | `description` | the whole description, its interfaces and types |
 //! | `structure` | outputs, derivatives and initial unknowns, by value reference |
-//! | `validate` | conditions on a description that is to be written |
+//! | `validate` | conditions on a description to be written |
 //! | `xml` | the file `modelDescription.xml`, written |
 //! | `read` | the same file, read |
 //! | `terminals` | the file `terminalsAndIcons.xml`, written and read |
@@ -75,12 +75,13 @@ pub use variable::{
 /// One value of an enumeration type, of 64 bits.
 pub type EnumerationItem = crate::EnumerationItem<i64>;
 
-/// Stands for a dimension of a variable among the attributes that cannot be read.
+/// Denotes a dimension of a variable among the attributes that cannot be read.
 pub(crate) const DIMENSION: &str = "Dimension";
-/// Stands there for a list of clocks that is there and empty.
+/// Denotes an empty list of clocks there.
 pub(crate) const NO_CLOCK: &str = "clocks: empty";
 
-/// The folder of this platform's binaries inside an archive of FMI 3.0 (section 2.5.1.4.2), such as `x86_64-linux`.
+/// The folder of this platform's binaries in an archive of FMI 3.0 (section 2.5.1.4.2), such as
+/// `x86_64-linux`.
 pub const PLATFORM: &str = if cfg!(all(target_os = "windows", target_arch = "x86_64")) {
     "x86_64-windows"
 } else if cfg!(all(target_os = "windows", target_arch = "x86")) {

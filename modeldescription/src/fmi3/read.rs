@@ -1,5 +1,4 @@
-//! Reads a model description of FMI 3.0 from its XML, whatever is wrong with it, as [`crate::Located`] does for
-//! 2.0.
+//! Reads a model description of FMI 3.0 from its XML, tolerating defects, as [`crate::Located`] does for 2.0.
 
 use super::{
     Alias, Binary, Clock, CoSimulation, DIMENSION, DataType, Dimension, EnumerationItem, Float, Integer,
@@ -20,7 +19,7 @@ pub(super) const INTERFACES: [&str; 3] = ["ModelExchange", "CoSimulation", "Sche
 pub struct Located {
     /// The content.
     pub description: ModelDescription,
-    /// The start values of the variables as written; those of texts and bytes with blanks between them.
+    /// The start values of the variables as written; those of texts and bytes are separated by blanks.
     pub starts: Vec<Option<String>>,
     pub(super) notes: Notes,
 }
@@ -33,24 +32,24 @@ impl Located {
         read
     }
 
-    /// The beginning of a part, in bytes from the beginning of the text. For a part that is not there, it is the
-    /// beginning of the part that should have it.
+    /// The offset of a part in the text, in bytes. If the part is missing, the
+    /// offset of the part that should contain it.
     pub fn position(&self, place: Place) -> usize {
         self.notes.position(place)
     }
 
-    /// Tells every rule of [`RULES`](crate::RULES) that is broken.
+    /// Reports every broken rule of [`RULES`](crate::RULES).
     pub fn check(&self, report: &mut dyn FnMut(Violation)) {
         fmi3::description(&self.description, &mut Check { unread: &self.notes.unread, report });
     }
 
-    /// Whether an attribute that must be there is missing, or one that is there is no value of its type.
+    /// Whether a required attribute is missing, or a present one is not a value of its type.
     pub fn is_unread(&self, place: Place, attribute: &'static str) -> bool {
         self.notes.is_unread(place, attribute)
     }
 
     fn root(&mut self, root: Node<'_, '_>) {
-        // The root's own attributes.
+        // The attributes of the root.
         let mut at = self.notes.enter(Place::Root, root);
         self.description = ModelDescription {
             model_name: at.text("modelName"),
@@ -141,7 +140,7 @@ impl Located {
         let mut at = self.notes.enter(Place::Type(t), node);
         let (name, description) = (at.text("name"), at.text("description"));
         let kind = at.kind(of, &[]);
-        // An item without a value stands for nothing.
+        // An item without a value is skipped.
         let valued =
             children(node, "Item").filter_map(|n| Some((n, n.attribute("value").and_then(integer)?)));
         let items = valued.enumerate().map(|(i, (node, value))| {
@@ -173,7 +172,7 @@ impl Located {
         };
         self.starts.push(start.clone().or_else(|| (!values.is_empty()).then(|| values.join(" "))));
         let kind = self.notes.at(place, Some(node)).kind(of, &values);
-        // An attribute without a word is there, but holds no value.
+        // An attribute without a word is present but has no value.
         if start.is_some() && values.is_empty() {
             self.notes.miss(Place::Start(v), "start");
         }
@@ -235,13 +234,13 @@ impl Located {
     }
 }
 
-/// The type that an element stands for, by one of its two spellings.
+/// The type that an element denotes, in one of its two spellings.
 fn data_type(node: Node<'_, '_>, spelling: fn(DataType) -> &'static str) -> Option<DataType> {
     DataType::ALL.iter().copied().find(|of| node.has_tag_name(spelling(*of)))
 }
 
 impl At<'_, '_, '_> {
-    /// Reads the attributes of a type, with the start values of a variable.
+    /// Reads the attributes of a type, and the start values of a variable.
     fn kind(&mut self, of: DataType, starts: &[&str]) -> VariableKind {
         use VariableKind as K;
         let integers = |at: &mut Self| at.integers(of, starts);
@@ -305,7 +304,7 @@ impl At<'_, '_, '_> {
         }
     }
 
-    /// Reads the start values of a variable. If one of them cannot be read, this is noted, and there are none.
+    /// Reads the start values of a variable. If one of them cannot be read, this is noted and there are none.
     fn starts<T>(&mut self, starts: &[&str], parse: impl Fn(&str) -> Option<T>) -> Vec<T> {
         let values: Option<Vec<T>> = starts.iter().map(|text| parse(text)).collect();
         values.unwrap_or_else(|| {
@@ -316,7 +315,7 @@ impl At<'_, '_, '_> {
         })
     }
 
-    /// Reads an attribute of a dimension; one that cannot be read is noted as the variable's.
+    /// Reads an attribute of a dimension. If it cannot be read, this is noted for the variable.
     fn of_dimension<T>(&mut self, name: &str, parse: impl FnOnce(&str) -> Option<T>) -> Option<T> {
         let value = parse(self.attribute(name)?);
         if value.is_none() {

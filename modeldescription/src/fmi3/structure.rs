@@ -1,5 +1,5 @@
-//! `ModelStructure` of FMI 3.0: variables that are computed and their dependencies, all by value reference
-//! (FMI 3.0.2, section 2.4.8).
+//! `ModelStructure` of FMI 3.0: computed variables and their dependencies, all by value reference (FMI 3.0.2,
+//! section 2.4.8).
 
 use super::Variable;
 use crate::{Causality, UnknownList};
@@ -10,42 +10,43 @@ use serde::Serialize;
 pub struct ModelStructure {
     /// All outputs.
     pub outputs: Vec<Unknown>,
-    /// The derivatives of continuous states. Their order is that of the functions for continuous states.
+    /// The derivatives of continuous states, in the order that the functions for continuous states use.
     pub derivatives: Vec<Unknown>,
-    /// The states that change at ticks of clocks.
+    /// The states that change at clock ticks.
     pub clocked_states: Vec<Unknown>,
-    /// The unknowns of initialization: outputs that are not exact, calculated parameters, and states and derivatives
-    /// computed then.
+    /// The unknowns of initialization: outputs that are not exact, calculated parameters, and states and
+    /// derivatives computed during initialization.
     pub initial_unknowns: Vec<Unknown>,
     /// The event indicators, for model exchange.
     pub event_indicators: Vec<Unknown>,
 }
 
-/// A variable that is computed and its dependencies, as value references.
+/// A computed variable and its dependencies, as value references.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Unknown {
     /// The value reference of the variable.
     #[serde(rename = "@valueReference")]
     pub value_reference: u32,
-    /// The value references of its dependencies; `None` (the attribute is absent) means everything, empty nothing.
+    /// The value references of its dependencies. `None` (the attribute is absent) means all, empty means
+    /// none.
     #[serde(rename = "@dependencies", skip_serializing_if = "Option::is_none")]
     pub dependencies: Option<Vec<u32>>,
-    /// The kind of each dependency, in the words of the standard; `None`: nothing is said.
+    /// The kind of each dependency, in the terms of the standard, if declared.
     #[serde(rename = "@dependenciesKind", skip_serializing_if = "Option::is_none")]
     pub dependency_kinds: Option<Vec<String>>,
 }
 
 impl Unknown {
-    /// A variable of which nothing is said.
+    /// A variable without declared dependencies.
     pub fn new(value_reference: u32) -> Self {
         Self { value_reference, ..Self::default() }
     }
 }
 
 impl ModelStructure {
-    /// The lists that follow from the variables, in their order. Each variable with `derivative` counts as the derivative
-    /// of a continuous state, unless it or the state is an input. No dependencies are said, and there are no
-    /// clocked states and no event indicators.
+    /// The lists that follow from the variables, in their order. Each variable with `derivative` counts as
+    /// the derivative of a continuous state, unless it or the state is an input. No dependencies are
+    /// declared, and there are no clocked states and no event indicators.
     pub fn of(variables: &[Variable]) -> Self {
         let is_input = |reference: u32| {
             variables.iter().any(|v| v.value_reference == reference && v.causality == Causality::Input)

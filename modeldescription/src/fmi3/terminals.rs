@@ -1,5 +1,5 @@
-//! `terminalsAndIcons/terminalsAndIcons.xml`: variables grouped into terminals, so that a tool connects them with one
-//! line (FMI 3.0.2, section 2.4.9). The pictures of the file are neither written nor read.
+//! `terminalsAndIcons/terminalsAndIcons.xml`: variables grouped into terminals, which a tool can connect with
+//! one line (FMI 3.0.2, section 2.4.9). Its graphical information is neither written nor read.
 
 use super::ModelDescription;
 #[cfg(feature = "read")]
@@ -23,26 +23,26 @@ pub const TERMINALS: &str = "terminalsAndIcons/terminalsAndIcons.xml";
 /// The terminals of an FMU.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Terminals {
-    /// All terminals, each after the one that it lies in.
+    /// All terminals, each after its parent.
     pub terminals: Vec<Terminal>,
 }
 
-/// A group of variables that is connected as one.
+/// A group of variables that can be connected as one.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Terminal {
-    /// The position in [`Terminals::terminals`] of the terminal that this one lies in; `None`: in none.
+    /// The index in [`Terminals::terminals`] of its parent, if it is nested in one.
     pub inside: Option<usize>,
-    /// The name; not empty, one line, unique among those that lie in the same.
+    /// The name; not empty, one line, unique among terminals with the same parent.
     pub name: String,
-    /// The way that members find their partners: `plug`, `bus`, `sequence`, `none`, or a reversed domain name.
+    /// How members find their counterparts: `plug`, `bus`, `sequence`, `none`, or a reversed domain name.
     pub matching_rule: String,
-    /// The kind of terminal, as another standard names it; empty: the attribute is absent.
+    /// The kind of terminal, as another standard names it; if empty, the attribute is omitted.
     pub terminal_kind: String,
-    /// Meaning for a human; empty: the attribute is absent.
+    /// Its meaning, as a text for the reader; if empty, the attribute is omitted.
     pub description: String,
     /// Its variables.
     pub members: Vec<TerminalMember>,
-    /// Its variables of transported quantities.
+    /// Its variables for transported quantities.
     pub streams: Vec<StreamMember>,
 }
 
@@ -52,11 +52,11 @@ pub struct TerminalMember {
     /// The name of the variable.
     #[serde(rename = "@variableName")]
     pub variable_name: String,
-    /// The name in the terminal, which `plug` and `bus` match by; unique in the terminal; empty: the attribute is
-    /// absent.
+    /// The name in the terminal, by which `plug` and `bus` match; unique in the terminal. If empty, the
+    /// attribute is omitted.
     #[serde(rename = "@memberName", skip_serializing_if = "String::is_empty")]
     pub member_name: String,
-    /// The meaning of a connection: `signal`, `inflow`, `outflow`, or a reversed domain name.
+    /// How connected variables relate: `signal`, `inflow`, `outflow`, or a reversed domain name.
     #[serde(rename = "@variableKind")]
     pub variable_kind: String,
 }
@@ -69,24 +69,24 @@ impl TerminalMember {
     }
 }
 
-/// Two variables of a terminal for a quantity that a flow carries in and out.
+/// Two variables of a terminal for a quantity that a flow transports in and out.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct StreamMember {
-    /// The name in the terminal of what flows in.
+    /// The name in the terminal for the inflow.
     #[serde(rename = "@inStreamMemberName")]
     pub in_member_name: String,
-    /// The name in the terminal of what flows out.
+    /// The name in the terminal for the outflow.
     #[serde(rename = "@outStreamMemberName")]
     pub out_member_name: String,
-    /// The name of the variable of what flows in.
+    /// The name of the variable for the inflow.
     #[serde(rename = "@inStreamVariableName")]
     pub in_variable_name: String,
-    /// The name of the variable of what flows out.
+    /// The name of the variable for the outflow.
     #[serde(rename = "@outStreamVariableName")]
     pub out_variable_name: String,
 }
 
-/// The whole, or a terminal by its position, with the terminals that lie in it.
+/// The root element, or a terminal by its index, with the terminals nested in it.
 struct Element<'a> {
     all: &'a [Terminal],
     at: Option<usize>,
@@ -126,14 +126,14 @@ impl Serialize for Element<'_> {
 }
 
 impl Terminals {
-    /// The content of the file, for an FMU of this description: UTF-8 without byte order mark.
+    /// The content of the file for an FMU with this description: UTF-8 without byte order mark.
     ///
     /// # Errors
     ///
-    /// - A rule of [`RULES`](crate::RULES) on terminals is broken: names that are used twice, members that name no
-    ///   variable that can be connected, or members without the name that the matching rule goes by.
-    /// - There is no terminal, or one lies in a terminal that does not come before it.
-    /// - A required text is empty, a text has a character that XML 1.0 cannot carry, or a text of one
+    /// - A rule of [`RULES`](crate::RULES) on terminals is broken: duplicate names, members that are not
+    ///   connectable variables, or members without the name that the matching rule requires.
+    /// - There is no terminal, or one is nested in a terminal that does not come before it.
+    /// - A required text is empty, a text has a character that XML 1.0 cannot represent, or a text of one
     ///   line has a line break or tab.
     pub fn to_xml(&self, description: &ModelDescription) -> Result<String, Error> {
         if self.terminals.is_empty() {
@@ -186,19 +186,19 @@ impl Terminal {
 #[cfg(feature = "read")]
 #[derive(Debug, Default)]
 pub struct LocatedTerminals {
-    /// The content. A text that is missing is empty.
+    /// The content. A missing text is empty.
     pub terminals: Terminals,
     notes: Notes,
 }
 
 #[cfg(feature = "read")]
 impl LocatedTerminals {
-    /// Reads a document, whatever is wrong with it.
+    /// Reads a document, tolerating defects.
     pub fn read(document: &Document<'_>) -> Self {
         let mut read = Self::default();
         let root = document.root_element();
         read.notes.mark(Place::Root, root.range().start);
-        // A list replaces recursion, since the file decides the depth.
+        // An explicit queue replaces recursion, since the file determines the depth.
         let mut open: VecDeque<_> = list(root, "Terminals", "Terminal").map(|node| (None, node)).collect();
         while let Some((inside, node)) = open.pop_front() {
             let t = read.terminals.terminals.len();
@@ -214,7 +214,7 @@ impl LocatedTerminals {
         self.notes.position(place)
     }
 
-    /// Tells every rule of [`RULES`](crate::RULES) on terminals that is broken.
+    /// Reports every broken rule of [`RULES`](crate::RULES) on terminals.
     pub fn check(&self, description: &ModelDescription, report: &mut dyn FnMut(Violation)) {
         fmi3::terminals(&self.terminals, description, &mut Check { unread: &self.notes.unread, report });
     }

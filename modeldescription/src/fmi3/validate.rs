@@ -1,4 +1,4 @@
-//! Conditions on a description of FMI 3.0 that is to be written. The first violation found is reported.
+//! Conditions on a description of FMI 3.0 to be written. The first violation found is reported.
 
 use super::{DataType, Integer, ModelDescription, TypeDefinition, VariableKind};
 use crate::rules::{Check, Unread, Violation, fmi3};
@@ -11,10 +11,10 @@ impl ModelDescription {
     ///
     /// # Errors
     ///
-    /// - A required text is empty, a text has a character that XML 1.0 cannot carry, or a text of one
+    /// - A required text is empty, a text has a character that XML 1.0 cannot represent, or a text of one
     ///   line has a line break or tab.
-    /// - A date is not in UTC, a factor of a base unit or a nominal value not positive, a bound NaN or infinite on the
-    ///   wrong side, a start value infinite without such a bound.
+    /// - A date is not in UTC; a factor of a base unit or a nominal value is not positive; a bound is NaN or
+    ///   infinite on the wrong side; a start value is infinite without such a bound.
     /// - A number does not fit its type.
     /// - A rule of [`RULES`](crate::RULES) is broken.
     /// - There is no variable, or an enumeration has no items or no type.
@@ -60,7 +60,7 @@ impl ModelDescription {
 }
 
 impl ModelDescription {
-    /// Gives the paths of places in an error.
+    /// Provides the paths of places for errors.
     pub(super) fn paths<T>(&self, with: impl FnOnce(&Paths<'_>) -> T) -> T {
         with(&Paths {
             interfaces: &["model_exchange", "co_simulation", "scheduled_execution"],
@@ -83,7 +83,7 @@ fn definition(declared: &TypeDefinition) -> Result<(), Error> {
     items(&path, declared.kind.data_type() == DataType::Enumeration, &declared.items)
 }
 
-/// Checks bounds, start values and texts, which depend on the type.
+/// Checks the type-specific bounds, start values and texts.
 fn kind(path: &impl Fn(&str) -> String, kind: &VariableKind) -> Result<(), Error> {
     let of = kind.data_type();
     let quantity = |quantity: &Option<String>| {

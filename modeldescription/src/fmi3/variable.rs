@@ -3,7 +3,7 @@
 use crate::words::words;
 use crate::{Causality, Initial, InitialRule, Variability};
 
-/// The types, with their words and those of the elements that declare one.
+/// The types, with their names and those of the elements that declare a type.
 macro_rules! data_types {
     ($($(#[$doc:meta])* $variant:ident),+) => {
         /// The type of a variable.
@@ -30,45 +30,45 @@ macro_rules! data_types {
 }
 
 data_types! {
-    /// A number of 32 bits.
+    /// A 32-bit floating-point number.
     Float32,
-    /// A number of 64 bits.
+    /// A 64-bit floating-point number.
     Float64,
     /// An integer, -128 to 127.
     Int8,
     /// An integer, 0 to 255.
     UInt8,
-    /// An integer of 16 bits.
+    /// A 16-bit integer.
     Int16,
-    /// An integer of 16 bits, not negative.
+    /// An unsigned 16-bit integer.
     UInt16,
-    /// An integer of 32 bits.
+    /// A 32-bit integer.
     Int32,
-    /// An integer of 32 bits, not negative.
+    /// An unsigned 32-bit integer.
     UInt32,
-    /// An integer of 64 bits.
+    /// A 64-bit integer.
     Int64,
-    /// An integer of 64 bits, not negative; the type of sizes of arrays.
+    /// An unsigned 64-bit integer, the type of array sizes.
     UInt64,
-    /// A truth value.
+    /// A Boolean.
     Boolean,
     /// A text, UTF-8.
     String,
     /// Bytes.
     Binary,
-    /// An integer of 64 bits with named values.
+    /// A 64-bit integer with named values.
     Enumeration,
     /// A clock, which ticks.
     Clock
 }
 
 impl DataType {
-    /// Whether the type is one of floating-point numbers.
+    /// Whether the type is a floating-point type.
     pub const fn is_float(self) -> bool {
         matches!(self, Self::Float32 | Self::Float64)
     }
 
-    /// The least and the greatest value of an integer type or enumeration; of other types none.
+    /// The least and the greatest value of an integer type or enumeration; `None` for other types.
     pub const fn limits(self) -> Option<(i128, i128)> {
         Some(match self {
             Self::Int8 => (i8::MIN as i128, i8::MAX as i128),
@@ -84,10 +84,10 @@ impl DataType {
     }
 }
 
-/// The attributes of a `Float32` or `Float64`. Of a declared type those of the variable alone (`start`,
+/// The attributes of a `Float32` or `Float64`. In a declared type, those specific to variables (`start`,
 /// `derivative`, `reinit`) stay empty.
 ///
-/// Numbers of a `Float32` are held as doubles that a number of 32 bits can be.
+/// Numbers of a `Float32` are stored as doubles that a 32-bit number can represent.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Float {
     /// The physical quantity, for example `Acceleration`; one line.
@@ -96,71 +96,72 @@ pub struct Float {
     pub unit: Option<String>,
     /// The name of one of the display units of `unit`.
     pub display_unit: Option<String>,
-    /// Offsets of units do not count, as in differences of temperature; default false.
+    /// Whether unit offsets are ignored, as for differences of temperature; default false.
     pub relative_quantity: bool,
-    /// The value grows without bound, so its size says nothing about errors; default false.
+    /// Whether the value grows without bound, so that its magnitude says nothing about errors; default false.
     pub unbounded: bool,
-    /// Smallest allowed value, in `unit`; not NaN and not `INF`; absent: no limit.
+    /// Smallest allowed value, in `unit`; not NaN and not `INF`; no limit if absent.
     pub min: Option<f64>,
-    /// Largest allowed value, in `unit`; at least `min`, not NaN and not `-INF`; absent: no limit.
+    /// Largest allowed value, in `unit`; at least `min`, not NaN and not `-INF`; no limit if absent.
     pub max: Option<f64>,
     /// Typical magnitude, in `unit`; finite and greater than 0.
     pub nominal: Option<f64>,
-    /// First values or first guesses, in `unit`; empty: none. One stands for all elements of an array.
+    /// Start values or initial guesses, in `unit`; may be empty. A single value applies to all elements of an
+    /// array.
     pub start: Vec<f64>,
     /// The value reference of the variable that this is the time derivative of.
     pub derivative: Option<u32>,
-    /// A continuous state that its FMU may set at events; for model exchange, default false.
+    /// Whether the FMU may set this continuous state at events; for model exchange, default false.
     pub reinit: bool,
 }
 
-/// The attributes of an integer type or an enumeration. Of a declared type `start` stays empty.
+/// The attributes of an integer type or an enumeration. In a declared type, `start` stays empty.
 ///
 /// All values lie within [`DataType::limits`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Integer {
     /// The physical quantity; one line.
     pub quantity: Option<String>,
-    /// Smallest allowed value, dimensionless; absent: no limit.
+    /// Smallest allowed value, dimensionless; no limit if absent.
     pub min: Option<i128>,
-    /// Largest allowed value, at least `min`; absent: no limit.
+    /// Largest allowed value, at least `min`; no limit if absent.
     pub max: Option<i128>,
-    /// First values or first guesses; empty: none. One stands for all elements of an array.
+    /// Start values or initial guesses; may be empty. A single value applies to all elements of an array.
     pub start: Vec<i128>,
 }
 
 /// The attributes of a `Boolean` or `String`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Plain<T> {
-    /// First values or first guesses; empty: none. One stands for all elements of an array.
+    /// Start values or initial guesses; may be empty. A single value applies to all elements of an array.
     pub start: Vec<T>,
 }
 
-/// The attributes of a `Binary`. Of a declared type `start` stays empty.
+/// The attributes of a `Binary`. In a declared type, `start` stays empty.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Binary {
-    /// The media type of the bytes; absent: `application/octet-stream`.
+    /// The media type of the bytes; `application/octet-stream` if absent.
     pub mime_type: Option<String>,
-    /// The greatest length, in bytes; absent: no limit.
+    /// The greatest length, in bytes; no limit if absent.
     pub max_size: Option<u64>,
-    /// First values; empty: none. One stands for all elements of an array.
+    /// Start values; may be empty. A single value applies to all elements of an array.
     pub start: Vec<Vec<u8>>,
 }
 
-/// The way that the interval of a clock is given.
+/// How the interval of a clock is determined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum IntervalVariability {
     /// Given in the description.
     Constant,
     /// Given before initialization.
     Fixed,
-    /// Changed by tunable parameters.
+    /// Can be changed by tunable parameters.
     Tunable,
     /// Given again at each tick.
     Changing,
-    /// Given at some events, as the time to the next tick.
+    /// Given at some events as the time until the next tick.
     Countdown,
-    /// Not known before it ticks.
+    /// Unknown until it ticks.
     Triggered,
 }
 
@@ -170,17 +171,17 @@ words!(IntervalVariability: Constant "constant", Fixed "fixed", Tunable "tunable
 /// The attributes of a `Clock`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Clock {
-    /// The importer may leave out ticks; default false.
+    /// Whether the importer may skip ticks; default false.
     pub can_be_deactivated: bool,
     /// The order among clocks of scheduled execution, 0 first.
     pub priority: Option<u32>,
-    /// How its interval is given; must be there.
+    /// How its interval is determined; required.
     pub interval_variability: Option<IntervalVariability>,
     /// The interval, in seconds.
     pub interval_decimal: Option<f64>,
     /// The time of the first tick, in seconds; default 0.
     pub shift_decimal: f64,
-    /// The interval can be given as a fraction; default false.
+    /// Whether the interval can be given as a fraction; default false.
     pub supports_fraction: bool,
     /// The denominator of fractions, in ticks per second.
     pub resolution: Option<u64>,
@@ -190,30 +191,30 @@ pub struct Clock {
     pub shift_counter: u64,
 }
 
-/// The type of a variable, or a declared type, with the attributes that depend on it.
+/// The type of a variable, or a declared type, with its type-specific attributes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum VariableKind {
-    /// A number of 32 bits in its unit.
+    /// A 32-bit floating-point number in its unit.
     Float32(Float),
-    /// A number of 64 bits in its unit.
+    /// A 64-bit floating-point number in its unit.
     Float64(Float),
     /// An integer, -128 to 127.
     Int8(Integer),
     /// An integer, 0 to 255.
     UInt8(Integer),
-    /// An integer of 16 bits.
+    /// A 16-bit integer.
     Int16(Integer),
-    /// An integer of 16 bits, not negative.
+    /// An unsigned 16-bit integer.
     UInt16(Integer),
-    /// An integer of 32 bits.
+    /// A 32-bit integer.
     Int32(Integer),
-    /// An integer of 32 bits, not negative.
+    /// An unsigned 32-bit integer.
     UInt32(Integer),
-    /// An integer of 64 bits.
+    /// A 64-bit integer.
     Int64(Integer),
-    /// An integer of 64 bits, not negative.
+    /// An unsigned 64-bit integer.
     UInt64(Integer),
-    /// A truth value.
+    /// A Boolean.
     Boolean(Plain<bool>),
     /// A text.
     String(Plain<String>),
@@ -226,7 +227,7 @@ pub enum VariableKind {
 }
 
 impl VariableKind {
-    /// The type alone.
+    /// The type without its attributes.
     pub const fn data_type(&self) -> DataType {
         match self {
             Self::Float32(_) => DataType::Float32,
@@ -255,7 +256,7 @@ impl VariableKind {
         }
     }
 
-    /// The attributes of a floating-point number, to change.
+    /// The attributes of a floating-point number, mutable.
     pub const fn as_float_mut(&mut self) -> Option<&mut Float> {
         match self {
             Self::Float32(of) | Self::Float64(of) => Some(of),
@@ -279,7 +280,7 @@ impl VariableKind {
         }
     }
 
-    /// The attributes of an integer or enumeration, to change.
+    /// The attributes of an integer or enumeration, mutable.
     pub const fn as_integer_mut(&mut self) -> Option<&mut Integer> {
         match self {
             Self::Int8(of)
@@ -295,17 +296,17 @@ impl VariableKind {
         }
     }
 
-    /// The unit; of a floating-point number only.
+    /// The unit; only of a floating-point number.
     pub fn unit(&self) -> Option<&str> {
         self.as_float()?.unit.as_deref()
     }
 
-    /// The display unit; of a floating-point number only.
+    /// The display unit; only of a floating-point number.
     pub fn display_unit(&self) -> Option<&str> {
         self.as_float()?.display_unit.as_deref()
     }
 
-    /// `min` and `max` as doubles, those of integers rounded; of other types none.
+    /// `min` and `max` as doubles, rounded for integers; `None` for other types.
     pub fn range(&self) -> (Option<f64>, Option<f64>) {
         match (self.as_float(), self.as_integer()) {
             (Some(of), _) => (of.min, of.max),
@@ -324,7 +325,7 @@ impl VariableKind {
         }
     }
 
-    /// The start values as doubles, those of 64-bit integers rounded and of a Boolean 0 or 1; of other types none.
+    /// The start values as doubles: 64-bit integers are rounded, Booleans are 0 or 1. Empty for other types.
     pub fn start_numbers(&self) -> Vec<f64> {
         match (self, self.as_float(), self.as_integer()) {
             (Self::Boolean(of), ..) => of.start.iter().map(|&start| f64::from(u8::from(start))).collect(),
@@ -335,12 +336,12 @@ impl VariableKind {
     }
 }
 
-/// The size of one dimension of an array: exactly one of both must be given.
+/// The size of one dimension of an array. Exactly one of the two fields must be given.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Dimension {
     /// The number of elements, at least 1.
     pub start: Option<u64>,
-    /// The value reference of the structural parameter or constant that has the number of elements.
+    /// The value reference of the structural parameter or constant that holds the number of elements.
     pub value_reference: Option<u32>,
 }
 
@@ -350,7 +351,7 @@ impl Dimension {
         Self { start: Some(elements), value_reference: None }
     }
 
-    /// A dimension with as many elements as the variable of this value reference says.
+    /// A dimension whose size is the value of the variable with this value reference.
     pub const fn of(value_reference: u32) -> Self {
         Self { start: None, value_reference: Some(value_reference) }
     }
@@ -361,9 +362,9 @@ impl Dimension {
 pub struct Alias {
     /// The name; unique among all variables and aliases, not empty, one line.
     pub name: String,
-    /// Meaning for a human; empty: the attribute is absent.
+    /// Its meaning, as a text for the reader; if empty, the attribute is omitted.
     pub description: String,
-    /// The name of a display unit of the variable's unit; of a floating-point number only.
+    /// The name of a display unit of the variable's unit; only for a floating-point number.
     pub display_unit: Option<String>,
 }
 
@@ -371,38 +372,38 @@ pub struct Alias {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variable {
     /// The name; not empty, unique, one line, and of the form that the description's
-    /// [`NamingConvention`](crate::NamingConvention) asks for.
+    /// [`NamingConvention`](crate::NamingConvention) requires.
     pub name: String,
     /// The handle of the variable in the C interface; unique among all variables.
     pub value_reference: u32,
-    /// Meaning for a human; empty: the attribute is absent.
+    /// Its meaning, as a text for the reader; if empty, the attribute is omitted.
     pub description: String,
     /// The role of the variable.
     pub causality: Causality,
-    /// The instants at which it may change; the pair with `causality` must be legal, see [`InitialRule::of_fmi3`].
+    /// When its value may change; the pair with `causality` must be legal, see [`InitialRule::of_fmi3`].
     pub variability: Variability,
-    /// The origin of its first value; `None`: the default of [`InitialRule::of_fmi3`].
+    /// How its first value is determined; `None` means the default of [`InitialRule::of_fmi3`].
     pub initial: Option<Initial>,
-    /// The name of the type that gives the attributes that are not given here; of an enumeration it must be there.
+    /// The name of the type that provides omitted attributes; required for an enumeration.
     pub declared_type: Option<String>,
     /// Type, start values and range.
     pub kind: VariableKind,
-    /// The sizes of an array, the last one running fastest; empty: a scalar.
+    /// The sizes of an array, with the last dimension varying fastest; empty for a scalar.
     pub dimensions: Vec<Dimension>,
-    /// Other names of the same variable.
+    /// Alternative names.
     pub aliases: Vec<Alias>,
-    /// The value references of the clocks that it belongs to; empty: not clocked.
+    /// The value references of the clocks that it belongs to; empty if it is not clocked.
     pub clocks: Vec<u32>,
     /// The value reference of the previous value of a clocked state.
     pub previous: Option<u32>,
-    /// It can be read and set between communication points; default false.
+    /// Whether it can be read and set between communication points; default false.
     pub intermediate_update: bool,
-    /// An input that may be set more than once at one instant; absent: true.
+    /// Whether an input may be set more than once at one instant; true if absent.
     pub can_handle_multiple_set: Option<bool>,
 }
 
 impl Variable {
-    /// A scalar with everything else left out.
+    /// A scalar with defaults for everything else.
     pub fn new(
         name: impl Into<String>,
         value_reference: u32,
@@ -428,7 +429,7 @@ impl Variable {
         }
     }
 
-    /// The variability of a variable that does not say its own.
+    /// The variability of a variable that does not declare one.
     pub fn default_variability(causality: Causality, of: DataType) -> Variability {
         match causality {
             Causality::Parameter | Causality::StructuralParameter | Causality::CalculatedParameter => {
@@ -439,8 +440,8 @@ impl Variable {
         }
     }
 
-    /// The origin of the first value, with the default of the standard filled in. `None` for clocks, the independent
-    /// variable and illegal pairs of causality and variability.
+    /// How the first value is determined, with the default of the standard filled in. `None` for clocks, the
+    /// independent variable and illegal pairs of causality and variability.
     pub fn effective_initial(&self) -> Option<Initial> {
         if self.kind.data_type() == DataType::Clock {
             return None;
@@ -448,18 +449,18 @@ impl Variable {
         self.initial.or_else(|| InitialRule::of_fmi3(self.causality, self.variability)?.default)
     }
 
-    /// Whether a start value is required; where it is not, it is forbidden.
+    /// Whether a start value is required; otherwise it is forbidden.
     pub fn needs_start(&self) -> bool {
         matches!(self.effective_initial(), Some(Initial::Exact | Initial::Approx))
     }
 
-    /// Whether the first value is computed in initialization.
+    /// Whether the first value is computed during initialization.
     pub fn is_computed(&self) -> bool {
         matches!(self.effective_initial(), Some(Initial::Approx | Initial::Calculated))
     }
 
-    /// Whether the variable belongs to the initial unknowns whatever the states are: outputs with initial approx or
-    /// calculated that are not clocked, and calculated parameters.
+    /// Whether the variable is an initial unknown independently of the states: an output with initial approx
+    /// or calculated that is not clocked, or a calculated parameter.
     pub fn is_initial_unknown(&self) -> bool {
         match self.causality {
             Causality::Output => self.is_computed() && self.clocks.is_empty(),
@@ -468,12 +469,12 @@ impl Variable {
         }
     }
 
-    /// The value reference of the state that this is the derivative of.
+    /// The value reference of the state whose derivative this is.
     pub fn state(&self) -> Option<u32> {
         self.kind.as_float()?.derivative
     }
 
-    /// The sizes of the dimensions, with `find` for the variables that have them.
+    /// The sizes of the dimensions; `find` gives the variables that hold sizes.
     pub(crate) fn shape<'a>(&self, find: impl Fn(u32) -> Option<&'a Self>) -> Option<Vec<u64>> {
         let size = |dimension: &Dimension| match (dimension.start, dimension.value_reference) {
             (Some(size), None) => Some(size),

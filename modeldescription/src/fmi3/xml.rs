@@ -1,7 +1,7 @@
-//! The file `modelDescription.xml` of FMI 3.0, in the order of `fmi3ModelDescription.xsd`.
+//! Writes the file `modelDescription.xml` of FMI 3.0, in the order of `fmi3ModelDescription.xsd`.
 //!
-//! Attributes at the default of the schema are left out, except causality, variability and initial: a reader of
-//! the file should not have to know the table of defaults.
+//! Attributes at the schema's default are omitted, except causality, variability and initial, so that a
+//! reader of the file need not know the table of defaults.
 
 use super::{
     Alias, CoSimulation, DataType, Dimension, Interface, ModelDescription, ModelExchange, ModelStructure,
@@ -14,11 +14,11 @@ use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 use std::fmt::Display;
 
-/// The value of `fmiVersion` that is written.
+/// The value of `fmiVersion`.
 pub(super) const VERSION: &str = "3.0";
 
 impl ModelDescription {
-    /// The content of `modelDescription.xml`: UTF-8 without byte order mark, two blanks of indentation.
+    /// The content of `modelDescription.xml`: UTF-8 without byte order mark, indented by two blanks.
     ///
     /// The same description always gives the same text.
     ///
@@ -173,12 +173,12 @@ impl Serialize for Variable {
     }
 }
 
-/// A list of values, with blanks between them.
+/// A list of values, separated by blanks.
 fn joined<T: Display>(values: &[T]) -> String {
     values.iter().map(T::to_string).collect::<Vec<_>>().join(" ")
 }
 
-/// The start values that are in one attribute.
+/// The start values, joined into one attribute.
 fn starts<T>(values: &[T], word: impl Fn(&T) -> String) -> Option<String> {
     container(values, |values| values.iter().map(word).collect::<Vec<_>>().join(" "))
 }
@@ -193,7 +193,7 @@ fn number(of: DataType, value: f64) -> String {
 }
 
 impl VariableKind {
-    /// Writes the attributes that a declared type has too.
+    /// Writes the attributes that declared types share.
     fn attributes<E: SerializeStruct>(&self, element: &mut E) -> Result<(), E::Error> {
         let number = |value: f64| number(self.data_type(), value);
         if let Some(of) = self.as_float() {
@@ -236,7 +236,7 @@ impl VariableKind {
         }
     }
 
-    /// Writes the start values that are in an attribute.
+    /// Writes the start values that go into an attribute.
     fn start_attribute<E: SerializeStruct>(&self, element: &mut E) -> Result<(), E::Error> {
         let text = match (self, self.as_float(), self.as_integer()) {
             (Self::Boolean(of), ..) => starts(&of.start, bool::to_string),
@@ -247,7 +247,7 @@ impl VariableKind {
         optional(element, "@start", text)
     }
 
-    /// Writes the start values that are in separate elements.
+    /// Writes the start values that go into separate elements.
     fn start_elements<E: SerializeStruct>(&self, element: &mut E) -> Result<(), E::Error> {
         #[derive(Serialize)]
         struct Start<T> {

@@ -1,5 +1,5 @@
-//! Rules of FMI 2.0 alone (FMI 2.0.4, sections 2.2.7, 2.2.8 and 4.3.1), and what the shared rules ask of its
-//! variables.
+//! Rules specific to FMI 2.0 (FMI 2.0.4, sections 2.2.7, 2.2.8 and 4.3.1), and the properties of its
+//! variables that the shared rules need.
 
 #[cfg(feature = "read")]
 use super::UnknownList;
@@ -291,7 +291,7 @@ impl Check<'_> {
     }
 }
 
-/// Whether an importer sets the variable.
+/// Whether an importer can set the variable.
 fn is_settable(variable: &Variable) -> bool {
     matches!(variable.causality, Causality::Parameter | Causality::Input)
 }

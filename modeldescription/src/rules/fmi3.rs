@@ -1,4 +1,5 @@
-//! Rules of FMI 3.0 alone (FMI 3.0.2, sections 2.4.7 and 2.4.8), and what the shared rules ask of its variables.
+//! Rules specific to FMI 3.0 (FMI 3.0.2, sections 2.4.7 and 2.4.8), and the properties of its variables that
+//! the shared rules need.
 
 use super::structure::{Listed, Numbering};
 use super::variables::{AnyType, AnyVariable, Scope};
@@ -114,7 +115,7 @@ impl AnyVariable for Variable {
     }
 }
 
-/// Variables by value reference; of several the first.
+/// Variables by value reference; the first one if there are several.
 type References<'a> = HashMap<u32, &'a Variable>;
 
 /// Checks every rule on a description and its structure.
@@ -126,7 +127,7 @@ pub(crate) fn description(description: &ModelDescription, check: &mut Check<'_>)
     check.units(&description.units);
     let structured = description.variable_naming_convention == NamingConvention::Structured;
     let mut scope = Scope::new(&description.units, &description.types, structured);
-    // Types and variables may have the same name here.
+    // In FMI 3.0, types and variables may share a name.
     check.types(&description.types, &scope.units, &HashSet::new());
     let references = check.references(&description.variables);
     let mut previous = HashMap::new();
@@ -159,7 +160,7 @@ pub(crate) fn terminals(terminals: &Terminals, description: &ModelDescription, c
         if !levels.insert((terminal.inside, terminal.name.as_str())) {
             check.add("terminal.unique", place, format!("the terminal {name:?} is there twice on its level"));
         }
-        // Names of members with the variables that they stand for; streams have two.
+        // Names of members with their variables; streams have two.
         let members =
             terminal.members.iter().map(|m| vec![(m.member_name.as_str(), m.variable_name.as_str())]);
         let streams = terminal.streams.iter().map(|m| {
@@ -447,7 +448,7 @@ impl Check<'_> {
             (&none, &numbers),
             &numbering,
         );
-        // Initial unknowns. Clocked variables may be there, as the FMU wishes.
+        // Initial unknowns. Clocked variables may be included, at the FMU's choice.
         let mut wanted = of(&Variable::is_initial_unknown);
         for derivative in &structure.derivatives {
             let variable = references.get(&derivative.value_reference);
@@ -467,7 +468,8 @@ impl Check<'_> {
         self.unsaid(Outputs.element(), &listed(Outputs), inputs);
     }
 
-    /// Only floating-point numbers depend by a factor. A warning: the Feedthrough of the Reference FMUs has others.
+    /// Only floating-point numbers can have linear dependencies. This is a warning, since the Feedthrough of
+    /// the Reference FMUs has others.
     fn kinds(&mut self, list: UnknownList, unknowns: &[Unknown], references: &References<'_>) {
         for (u, unknown) in unknowns.iter().enumerate() {
             let Some(variable) = references.get(&unknown.value_reference) else { continue };
@@ -491,7 +493,7 @@ fn is_continuous(variable: &Variable) -> bool {
     variable.kind.data_type().is_float() && variable.variability == Variability::Continuous
 }
 
-/// The defect of the size of a dimension, if it has one.
+/// The defect in the size of a dimension, if any.
 fn size_defect(dimension: &Dimension, references: &References<'_>) -> Option<String> {
     let reference = match (dimension.start, dimension.value_reference) {
         (Some(0), None) => return Some("has start = 0; must be at least 1".to_owned()),

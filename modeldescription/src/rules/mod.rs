@@ -1,13 +1,13 @@
-//! Rules of the standard beyond the schema (FMI 2.0.4, sections 2.2 and 4.3; FMI 3.0.2, section 2.4): one list for
-//! both versions, for descriptions that are about to be written and for those that were read.
+//! Rules of the standard beyond the schema (FMI 2.0.4, sections 2.2 and 4.3; FMI 3.0.2, section 2.4): one
+//! list for both versions, for descriptions to be written and for those that were read.
 //!
-//! A description that is written must keep all rules; in FMI 2.0 its structure follows from its variables. A
-//! description that was read ([`Located`](crate::Located)) may break any rule, and some of its
-//! attributes may be no values of their type at all. The model has nothing in their place, and rules that need
-//! them are silent.
+//! A description to be written must satisfy all rules; in FMI 2.0 its structure follows from its variables. A
+//! description that was read ([`Located`](crate::Located)) may break any rule, and some of its attributes may
+//! not even be values of their type. The model has nothing in their place, and rules that need them report
+//! nothing.
 //!
-//! A rule that both versions have is here, in `variables` or in `structure`; `fmi2` and `fmi3` have their own,
-//! and say what the shared ones ask of a variable.
+//! Rules that both versions share are here, in `variables` and in `structure`. `fmi2` and `fmi3` have their
+//! own rules, and provide the properties of variables that the shared rules need.
 
 pub(crate) mod fmi2;
 pub(crate) mod fmi3;
@@ -19,13 +19,13 @@ use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 use std::fmt;
 
-/// Severity of breaking a rule.
+/// How serious it is to break a rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// The standard is broken, or the FMU does not work.
+    /// The FMU violates the standard or does not work.
     Error,
-    /// Allowed, but some importers will stumble over it.
+    /// Allowed, but some importers will have trouble.
     Warning,
 }
 
@@ -40,7 +40,7 @@ impl fmt::Display for Severity {
 
 use Severity::{Error, Warning};
 
-/// Every rule on descriptions: its name, the severity of breaking it, and its demand. A rule's name never changes
+/// Every rule on descriptions: its name, its severity, and what it requires. The name of a rule never changes
 /// its meaning.
 pub const RULES: &[(&str, Severity, &str)] = &[
     ("interface.co-simulation", Error, "the FMU offers co-simulation, once, or model exchange"),
@@ -130,7 +130,7 @@ impl UnknownList {
     pub const ALL: [Self; 5] =
         [Self::Outputs, Self::Derivatives, Self::ClockedStates, Self::InitialUnknowns, Self::EventIndicators];
 
-    /// The name of the list, in FMI 2.0 that of its element.
+    /// The name of the list; in FMI 2.0 that of its element.
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::Outputs => "Outputs",
@@ -153,13 +153,13 @@ impl UnknownList {
     }
 }
 
-/// A place in a description; numbers are positions in its lists, from 0.
+/// A place in a description; numbers are indices in its lists, from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Place {
-    /// The whole.
+    /// The root.
     Root,
-    /// An interface. In FMI 2.0 one for co-simulation: the model's is the first. In FMI 3.0 the one for model exchange,
-    /// co-simulation or scheduled execution, in this order.
+    /// An interface. In FMI 2.0 one for co-simulation, of which the model contains the first. In FMI 3.0 the
+    /// one for model exchange, co-simulation or scheduled execution, in this order.
     Interface(usize),
     /// The interface for model exchange of FMI 2.0.
     ModelExchange,
@@ -181,17 +181,17 @@ pub enum Place {
     Start(usize),
     /// A variable, and one of its aliases.
     Alias(usize, usize),
-    /// A terminal, those inside of others counted after them.
+    /// A terminal; nested terminals come after all outer ones.
     Terminal(usize),
     /// A terminal, and one of its members; stream members come after the others.
     Member(usize, usize),
     /// A list of the structure.
     Unknowns(UnknownList),
-    /// One of a list of the structure.
+    /// An element of a list of the structure.
     Unknown(UnknownList, usize),
 }
 
-/// A rule that is broken.
+/// A broken rule.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Violation {
     /// The name of one of [`RULES`].
@@ -202,10 +202,10 @@ pub struct Violation {
     pub message: String,
 }
 
-/// Attributes that are missing though they must be there, or are no value of their type.
+/// Attributes that are required but missing, or are not values of their type.
 pub(crate) type Unread = HashSet<(Place, &'static str)>;
 
-/// What could not be read, and the reporter that rules tell.
+/// The attributes that could not be read, and the callback that rules report to.
 pub(crate) struct Check<'a> {
     pub(crate) unread: &'a Unread,
     pub(crate) report: &'a mut dyn FnMut(Violation),
@@ -220,7 +220,7 @@ impl Check<'_> {
         self.unread.contains(&(place, attribute))
     }
 
-    /// Checks the text that ties description and library together.
+    /// Checks the text that links description and library.
     fn token(&mut self, rule: &'static str, attribute: &'static str, token: &str) {
         if token.trim().is_empty() && !self.is_unread(Place::Root, attribute) {
             let message = format!("{attribute} is empty; must be a text that no other FMU has");
@@ -228,7 +228,7 @@ impl Check<'_> {
         }
     }
 
-    /// Checks the name of the libraries.
+    /// Checks a model identifier.
     fn identifier(&mut self, place: Place, name: &str) {
         if !is_c_identifier(name) && !self.is_unread(place, "modelIdentifier") {
             let message = format!(
@@ -239,7 +239,7 @@ impl Check<'_> {
         }
     }
 
-    /// Checks two flags, each with its name, of which the first needs the second.
+    /// Checks two flags with their names; the first requires the second.
     fn flags(&mut self, place: Place, flag: (&str, bool), needs: (&str, bool)) {
         if flag.1 && !needs.1 {
             let message = format!("{} is true, so {} must be true; it is false", flag.0, needs.0);
@@ -325,7 +325,7 @@ impl Check<'_> {
     }
 }
 
-/// Round-off of a time that is the difference of two, as a part of it.
+/// Relative round-off of a time that is the difference of two times.
 const ROUND_OFF: f64 = 1e-9;
 
 /// The beginning of a long text, for messages.

@@ -1,22 +1,22 @@
-//! Rules on `ModelStructure` that both versions of the standard have (FMI 2.0.4, section 2.2.8; FMI 3.0.2, section
-//! 2.4.8). FMI 2.0 numbers variables by their index from 1, FMI 3.0 by their value reference.
+//! Rules on `ModelStructure` that both versions of the standard share (FMI 2.0.4, section 2.2.8; FMI 3.0.2,
+//! section 2.4.8). FMI 2.0 numbers variables by their index from 1, FMI 3.0 by their value reference.
 
 use super::{Check, Place, UnknownList, brief};
 use std::collections::{BTreeSet, HashSet};
 
-/// Most names shown of a longer list.
+/// The most names shown of a longer list.
 const SHOWN: usize = 8;
 
-/// A variable that is computed, by its number, and its dependencies.
+/// A computed variable, by its number, and its dependencies.
 pub(super) struct Listed<'a> {
     pub(super) number: u32,
     pub(super) dependencies: Option<&'a [u32]>,
     pub(super) kinds: Option<&'a [String]>,
 }
 
-/// The numbers that lists name variables by.
+/// How lists refer to variables by number.
 pub(super) struct Numbering<'a> {
-    /// The attribute that has the number.
+    /// The attribute that contains the number.
     pub(super) attribute: &'static str,
     /// The name of a list.
     pub(super) of_list: fn(UnknownList) -> &'static str,
@@ -27,12 +27,12 @@ pub(super) struct Numbering<'a> {
     /// The word for the number of a dependency, and what is allowed there.
     pub(super) dependency: &'static str,
     pub(super) wanted_dependency: String,
-    /// The name of the variable of a number.
+    /// The name of the variable with a number.
     pub(super) find: &'a dyn Fn(u32) -> Option<&'a str>,
 }
 
 impl Check<'_> {
-    /// Checks that numbers are those of variables, and dependencies in themselves.
+    /// Checks that numbers refer to variables, and that dependencies are consistent.
     pub(super) fn numbers(&mut self, list: UnknownList, unknowns: &[Listed<'_>], numbering: &Numbering<'_>) {
         let (find, name) = (numbering.find, (numbering.of_list)(list));
         for (u, unknown) in unknowns.iter().enumerate() {
@@ -78,7 +78,7 @@ impl Check<'_> {
         }
     }
 
-    /// Checks that a list holds the variables wanted, each once, and no other than those allowed.
+    /// Checks that a list contains each wanted variable exactly once, and no others than those allowed.
     pub(super) fn complete(
         &mut self,
         rule: &'static str,
@@ -114,13 +114,13 @@ impl Check<'_> {
         }
     }
 
-    /// Tells of a derivative in the list that is none.
+    /// Reports a variable in the list of derivatives that is not a derivative.
     pub(super) fn no_derivative(&mut self, u: usize, variable: &str, list: &str) {
         let message = format!("{list} lists {:?}, which has no attribute derivative", brief(variable));
         self.add("structure.derivatives", Place::Unknown(UnknownList::Derivatives, u), message);
     }
 
-    /// Checks that outputs say what they depend on, where there are inputs.
+    /// Checks that outputs declare their dependencies if there are inputs.
     pub(super) fn unsaid(&mut self, name: &str, outputs: &[Listed<'_>], inputs: bool) {
         let unsaid = outputs.iter().filter(|unknown| unknown.dependencies.is_none()).count();
         if inputs && unsaid > 0 {

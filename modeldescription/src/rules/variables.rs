@@ -1,14 +1,14 @@
-//! Rules on variables and declared types that both versions of the standard have (FMI 2.0.4, section 2.2.7; FMI
-//! 3.0.2, section 2.4.7), over what they ask of one.
+//! Rules on variables and declared types that both versions of the standard share (FMI 2.0.4, section 2.2.7;
+//! FMI 3.0.2, section 2.4.7), and the properties that they need.
 
 use super::{Check, Place, brief};
 use crate::{Causality, Initial, InitialRule, Unit, Variability, is_structured_name};
 use std::collections::{HashMap, HashSet};
 
-/// What the rules ask of a declared type.
+/// The properties of a declared type that the rules need.
 pub(crate) trait AnyType {
     fn name(&self) -> &str;
-    /// The type, as the standard spells it.
+    /// The name of the type in the standard.
     fn type_name(&self) -> &'static str;
     fn unit(&self) -> Option<&str>;
     fn display_unit(&self) -> Option<&str>;
@@ -18,11 +18,11 @@ pub(crate) trait AnyType {
     fn items(&self) -> Vec<(&str, i64)>;
 }
 
-/// What the rules ask of a variable.
+/// The properties of a variable that the rules need.
 pub(crate) trait AnyVariable {
-    /// The types of floating-point numbers.
+    /// The floating-point types.
     const FLOATS: &'static str;
-    /// What is added where a variable is continuous but may not be.
+    /// A remark for a variable that is continuous but may not be.
     const CONTINUOUS: &'static str;
 
     fn name(&self) -> &str;
@@ -31,9 +31,9 @@ pub(crate) trait AnyVariable {
     fn initial(&self) -> Option<Initial>;
     /// With the default filled in.
     fn effective_initial(&self) -> Option<Initial>;
-    /// The rule on `initial` for a pair; `None` if it is not a legal one.
+    /// The rule on `initial` for a pair; `None` if the pair is not legal.
     fn legal(&self, causality: Causality, variability: Variability) -> Option<InitialRule>;
-    /// The type, as the standard spells it.
+    /// The name of the type in the standard.
     fn type_name(&self) -> &'static str;
     fn is_float(&self) -> bool;
     fn needs_start(&self) -> bool;
@@ -85,12 +85,12 @@ impl<'a> Units<'a> {
     }
 }
 
-/// What variables refer to, and what is known of those before.
+/// What variables can refer to, and what is known of the previous variables.
 pub(super) struct Scope<'a, T> {
     pub(super) units: Units<'a>,
-    /// Declared types by name, each with its position.
+    /// Declared types by name, each with its index.
     types: HashMap<&'a str, (usize, &'a T)>,
-    /// The number of the variable, from 1, that has a name first.
+    /// For each name, the number of the first variable that has it, from 1.
     names: HashMap<&'a str, usize>,
     independent: Option<&'a str>,
     structured: bool,
@@ -107,13 +107,13 @@ impl<'a, T: AnyType> Scope<'a, T> {
         }
     }
 
-    /// The unit of a variable, which may be that of its declared type.
+    /// The unit of a variable, possibly that of its declared type.
     pub(super) fn unit_of<V: AnyVariable>(&self, variable: &'a V) -> Option<&'a str> {
         let declared = || variable.declared_type().and_then(|name| self.types.get(name));
         variable.unit().or_else(|| declared()?.1.unit())
     }
 
-    /// Whether a variable was independent.
+    /// Whether some previous variable was independent.
     pub(super) fn is_independent_known(&self) -> bool {
         self.independent.is_some()
     }
@@ -154,7 +154,7 @@ impl Check<'_> {
         }
     }
 
-    /// Checks one variable, apart from what only one version of the standard has.
+    /// Checks one variable, except for what only one version of the standard has.
     pub(super) fn variable<'a, V: AnyVariable, T: AnyType>(
         &mut self,
         v: usize,
@@ -182,7 +182,7 @@ impl Check<'_> {
         }
     }
 
-    /// Checks a name of the variable at a position, which may be an alias.
+    /// Checks a name of the variable at an index; it may be an alias.
     pub(super) fn name<'a, T>(&mut self, place: Place, v: usize, name: &'a str, scope: &mut Scope<'a, T>) {
         if let Some(other) = scope.names.insert(name, v + 1) {
             let message = format!("the name {:?} is also that of variable {other} (from 1)", brief(name));
@@ -231,7 +231,7 @@ impl Check<'_> {
     }
 
     fn start<V: AnyVariable>(&mut self, v: usize, variable: &V) {
-        // An illegal combination is reported already; further findings on it would be noise.
+        // An illegal combination has already been reported, and further findings on it would be noise.
         let Some(rule) = variable.legal(variable.causality(), variable.variability()) else { return };
         if variable.initial().is_some_and(|initial| !rule.allowed.contains(&initial)) {
             return;

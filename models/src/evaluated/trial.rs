@@ -1,4 +1,4 @@
-//! Trial of code at sample states, before anything depends on it.
+//! Tries code at sample states before anything depends on it.
 
 use punctual_core::internal::samples;
 
@@ -7,12 +7,12 @@ use crate::Error;
 use crate::motion::Equations;
 use crate::series::Series;
 
-/// Reach of the differences, relative to a component and absolutely. The error of a difference is of the order of
-/// its square. That error and round-off are both far below [`APART`], unless a function changes over such a
-/// distance.
+/// Step of the differences, relative to a component and absolute. The error of a difference is of the order
+/// of its square. This error and round-off are both far below [`APART`], unless a function changes over such
+/// a distance.
 const REACH: f64 = 1e-5;
 
-/// Relative error that a difference may have: a derivative that is wrong is mostly wrong as a whole.
+/// Relative error that a difference may have. A derivative that is wrong is usually wrong by much more.
 const APART: f64 = 0.05;
 
 /// Round-off of a value in a difference, relative to the value.
@@ -21,15 +21,15 @@ const ROUND_OFF: f64 = 1e-10;
 /// Values and slopes of f, g and all barriers at a sample.
 type Outcome = Vec<[f64; 2]>;
 
-/// Runs the code at samples within `ranges`, as often as it takes to see what it does.
+/// Runs the code at samples within `ranges`, and compares derivatives with differences.
 ///
 /// # Errors
 ///
-/// Something that the code must not do.
+/// Anything that the code must not do.
 pub(super) fn run(equations: &mut Evaluated, barriers: usize, ranges: &[[f64; 2]]) -> Result<(), Error> {
     let mut found: Vec<Found> = Vec::new();
     for (k, (t, x)) in samples(ranges).into_iter().enumerate() {
-        // Components move forwards and backwards in turn, and no two of them by the same part.
+        // Components move forwards and backwards alternately, and no two of them by the same fraction.
         let part = |i: usize| if (i + k).is_multiple_of(2) { 1.0 } else { -0.7 + 0.01 * i as f64 };
         let v: Vec<f64> = x.iter().enumerate().map(|(i, x)| (1.0 + x.abs()) * part(i)).collect();
         let at = |s: f64| x.iter().zip(&v).map(|(x, v)| x + s * v).collect::<Vec<_>>();
@@ -72,14 +72,14 @@ pub(super) fn run(equations: &mut Evaluated, barriers: usize, ranges: &[[f64; 2]
     Ok(())
 }
 
-/// Findings on a component over all samples.
+/// Findings on one component over all samples.
 #[derive(Clone, Copy, Default)]
 struct Found {
     /// Samples at which the component and its difference are finite.
     samples: usize,
     /// Samples at which slope and difference differ.
     wrong: usize,
-    /// Slope and difference at the last of the wrong samples.
+    /// Slope and difference at the last wrong sample.
     slopes: [f64; 2],
 }
 

@@ -1,10 +1,10 @@
-//! A page of HTML with charts that can be zoomed and read off. It loads nothing from a network.
+//! An HTML page with charts that can be zoomed and read off. It loads nothing from a network.
 
 use serde::Serialize;
 
 use crate::plot;
 
-/// Draws the charts. It is written by hand, so that a page needs no library.
+/// Draws the charts. The script is written by hand, so that a page needs no library.
 const CHARTS: &str = include_str!("charts.js");
 const STYLE: &str = include_str!("page.css");
 
@@ -12,13 +12,13 @@ const STYLE: &str = include_str!("page.css");
 pub struct Page<'a, C> {
     /// The title, as text.
     pub title: &'a str,
-    /// What is in it, as HTML. A chart has a place: an element with its key as `data-chart`.
+    /// The content, as HTML. An element with a chart's key as `data-chart` is the place of that chart.
     pub body: &'a str,
     /// The charts with their keys: a list of pairs.
     pub charts: C,
-    /// Style of this page alone.
+    /// Additional style for this page.
     pub style: &'a str,
-    /// A script that runs when the charts are drawn; it finds them in `views`.
+    /// A script that runs after the charts are drawn; it finds them in `views`.
     pub script: &'a str,
 }
 
@@ -43,7 +43,8 @@ pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// JSON for a script. Text in it can neither end the script nor open a comment: `<` stands in strings only.
+/// JSON for a script. Text in it can neither end the script nor open a comment, since `<` only occurs in
+/// strings, where it is escaped.
 pub fn json(value: &impl Serialize) -> String {
     serde_json::to_string(value).unwrap_or_else(|_| "null".to_owned()).replace('<', "\\u003c")
 }

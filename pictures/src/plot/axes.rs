@@ -21,14 +21,14 @@ pub(super) struct Axes {
 }
 
 impl Axes {
-    /// The place of a point; NaN where it has none.
+    /// The position of a point on the sheet; NaN if it has none.
     pub(super) fn place(&self, x: f64, y: f64) -> Point {
         let [left, top, right, bottom] = self.area;
         (left + self.x.fraction(x) * (right - left), bottom - self.y.fraction(y) * (bottom - top))
     }
 
-    /// Draws grid, frame, ticks and labels; an empty label is none, and without `x_ticks` the x
-    /// axis has no numbers.
+    /// Draws grid, frame, ticks and labels. An empty label is omitted, and without `x_ticks` the x axis has
+    /// no numbers.
     pub(super) fn frame(&self, canvas: &mut Canvas, x_label: &str, y_label: &str, x_ticks: bool) {
         let [left, top, right, bottom] = self.area;
         let grid = Pen::solid(GRID, 0.8);
@@ -58,12 +58,12 @@ impl Axes {
         }
     }
 
-    /// The width of the widest y tick label, in pixels, about.
+    /// The approximate width of the widest y tick label, in pixels.
     fn tick_width(&self) -> f64 {
         self.y.ticks.iter().map(|(_, label)| text_width(label, TICK_SIZE)).fold(0.0, f64::max)
     }
 
-    /// Draws sets, cut to the rectangle. For discs a pixel must mean the same on both axes.
+    /// Draws sets, clipped to the rectangle. Discs require equal scales on both axes.
     pub(super) fn sets(&self, canvas: &mut Canvas, discs: &[Disc], outlines: &[Outline]) {
         if discs.is_empty() && outlines.is_empty() {
             return;
@@ -83,8 +83,8 @@ impl Axes {
         });
     }
 
-    /// Draws a curve, cut to the rectangle, broken where a point has no place. Steps are taken right from point
-    /// to point.
+    /// Draws a curve, clipped to the rectangle and broken where a point has no position. With `steps`, it
+    /// runs right to the next point before it jumps.
     pub(super) fn curve(
         &self,
         canvas: &mut Canvas,
@@ -93,7 +93,7 @@ impl Axes {
         steps: bool,
     ) {
         let [left, top, right, bottom] = self.area;
-        // Far points are pulled near, so that cutting keeps its precision.
+        // Distant points are moved closer, so that clipping keeps its precision.
         let far = 4.0 * (right - left).max(bottom - top);
         let mut pieces: Vec<Vec<Point>> = vec![Vec::new()];
         for (x, y) in points {

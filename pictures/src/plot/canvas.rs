@@ -1,4 +1,4 @@
-//! A sheet to draw on, in pixels from the top left corner, written as SVG. Only this file names the crate svg.
+//! A sheet to draw on, in pixels from the top left corner, written as SVG. Only this file uses the crate svg.
 
 use std::path::Path;
 
@@ -9,11 +9,12 @@ use svg::node::element::{
 };
 use svg::{Document, Node};
 
-/// Families in order of preference; the viewer has one of them.
+/// Font families in order of preference; the viewer uses the first that it has.
 const FONT: &str = "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif";
-/// Mean width of a character over the size of the font: a digit of Helvetica has 0.556, English words have less.
+/// Mean width of a character relative to the font size: a digit of Helvetica has 0.556, English words less.
 const CHARACTER: f64 = 0.556;
-/// From the middle of a line of text down to its base line, over the size of the font: half a capital of Helvetica.
+/// Distance from the middle of a line of text down to its base line, relative to the font size: half a
+/// capital of Helvetica.
 const MIDDLE: &str = "0.36em";
 /// The same from the top of a line.
 const TOP: &str = "0.76em";
@@ -46,7 +47,7 @@ pub(super) enum Anchor {
     Middle,
 }
 
-/// The pen of a line.
+/// How a line is drawn.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pen {
     pub(super) colour: [u8; 3],
@@ -62,7 +63,7 @@ impl Pen {
     }
 }
 
-/// The width of a text in pixels, about: the viewer chooses the font, so nobody here knows it.
+/// The approximate width of a text in pixels; the viewer chooses the font, so the exact width is unknown.
 pub(super) fn text_width(text: &str, size: f64) -> f64 {
     text.chars().count() as f64 * size * CHARACTER
 }
@@ -76,7 +77,7 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
-    /// A white sheet of this size in pixels. `name` begins its ids, which must differ among the sheets of a page.
+    /// A white sheet of this size in pixels. `name` is the prefix of its ids, which must be unique on a page.
     pub(super) fn new(name: &str, width: f64, height: f64) -> Self {
         let mut canvas =
             Self { name: name.to_owned(), size: (width, height), content: Group::new(), clips: Vec::new() };
@@ -108,11 +109,11 @@ impl Canvas {
         self.add(line);
     }
 
-    /// Dots or crosses of the size that `pen` gives them, as one element, since there may be thousands.
+    /// Dots or crosses sized by `pen`, as one element, since there may be thousands.
     pub(super) fn scattered(&mut self, points: impl Iterator<Item = Point>, crosses: bool, pen: Pen) {
         let mark = |(x, y): Point| match crosses {
-            true => format!("M{} {}l6 6m0 -6l-6 6", fine(x - 3.0), fine(y - 3.0)),
-            false => format!("M{} {}h0", fine(x), fine(y)),
+            true => format!("M{} {}l6 6m0 -6l-6 6", rounded(x - 3.0), rounded(y - 3.0)),
+            false => format!("M{} {}h0", rounded(x), rounded(y)),
         };
         let strokes = Strokes::new()
             .set("d", points.map(mark).collect::<String>())
@@ -127,14 +128,15 @@ impl Canvas {
         self.add(filled(Polygon::new().set("points", coordinates(points)), colour, opacity));
     }
 
-    /// A circle of this radius in pixels: filled, then drawn around.
+    /// A circle with this radius in pixels, filled and then outlined.
     pub(super) fn circle(&mut self, centre: Point, radius: f64, fill: ([u8; 3], f64), pen: Pen) {
-        let circle = Circle::new().set("cx", fine(centre.0)).set("cy", fine(centre.1)).set("r", fine(radius));
+        let circle =
+            Circle::new().set("cx", rounded(centre.0)).set("cy", rounded(centre.1)).set("r", rounded(radius));
         let circle = circle.set("stroke", hex(pen.colour)).set("stroke-width", pen.width);
         self.add(filled(circle, fill.0, fill.1));
     }
 
-    /// The area within an odd number of closed lines: filled, then drawn around.
+    /// The area that an odd number of closed lines encloses, filled and then outlined.
     pub(super) fn area(
         &mut self,
         rings: impl Iterator<Item = impl Iterator<Item = Point>>,
@@ -142,7 +144,7 @@ impl Canvas {
         pen: Pen,
     ) {
         let ring = |points: &mut dyn Iterator<Item = Point>| {
-            let points: Vec<_> = points.map(|(x, y)| format!("{} {}", fine(x), fine(y))).collect();
+            let points: Vec<_> = points.map(|(x, y)| format!("{} {}", rounded(x), rounded(y))).collect();
             format!("M{}Z", points.join("L"))
         };
         let strokes = Strokes::new()
@@ -158,13 +160,13 @@ impl Canvas {
         self.add(written(text, at, size, anchor, colour));
     }
 
-    /// A text that runs upwards, its middle at `at`.
+    /// A text that runs upwards, centred at `at`.
     pub(super) fn upward_text(&mut self, text: &str, at: Point, size: f64, colour: [u8; 3]) {
-        let turn = format!("rotate(-90 {} {})", fine(at.0), fine(at.1));
+        let turn = format!("rotate(-90 {} {})", rounded(at.0), rounded(at.1));
         self.add(written(text, at, size, Anchor::Middle, colour).set("transform", turn));
     }
 
-    /// Draws with everything outside a rectangle (left, top, right, bottom) cut away.
+    /// Draws with everything outside a rectangle (left, top, right, bottom) clipped.
     pub(super) fn clipped(&mut self, area: [f64; 4], draw: impl FnOnce(&mut Self)) {
         let known = self.clips.iter().position(|other| *other == area);
         let index = known.unwrap_or(self.clips.len());
@@ -192,10 +194,10 @@ impl Canvas {
         let mut definitions = Definitions::new();
         for (index, [left, top, right, bottom]) in self.clips.iter().enumerate() {
             let area = Rectangle::new()
-                .set("x", fine(*left))
-                .set("y", fine(*top))
-                .set("width", fine(right - left))
-                .set("height", fine(bottom - top));
+                .set("x", rounded(*left))
+                .set("y", rounded(*top))
+                .set("width", rounded(right - left))
+                .set("height", rounded(bottom - top));
             definitions = definitions.add(ClipPath::new().set("id", self.clip_id(index)).add(area));
         }
         let (width, height) = self.size;
@@ -218,8 +220,8 @@ fn written(text: &str, at: Point, size: f64, anchor: Anchor, colour: [u8; 3]) ->
         Anchor::Middle => ("middle", MIDDLE),
     };
     Text::new(text)
-        .set("x", fine(at.0))
-        .set("y", fine(at.1))
+        .set("x", rounded(at.0))
+        .set("y", rounded(at.1))
         .set("dy", down)
         .set("font-size", size)
         .set("text-anchor", across)
@@ -235,11 +237,11 @@ fn filled<E: Node>(mut element: E, colour: [u8; 3], opacity: f64) -> E {
 }
 
 fn coordinates(points: &[Point]) -> Vec<(f64, f64)> {
-    points.iter().map(|point| (fine(point.0), fine(point.1))).collect()
+    points.iter().map(|point| (rounded(point.0), rounded(point.1))).collect()
 }
 
-/// A length in pixels to two digits after the point. Adding 0 takes the sign from a zero.
-fn fine(length: f64) -> f64 {
+/// A length in pixels, rounded to two decimals. Adding 0 removes the sign of a zero.
+fn rounded(length: f64) -> f64 {
     (length * 100.0).round() / 100.0 + 0.0
 }
 

@@ -1,5 +1,5 @@
-//! Curves in a plane with axes of any kind, for pictures that the other kinds do not cover. A chart is data: it
-//! is drawn as SVG here and by a script in a page.
+//! Curves in a plane with axes of any kind, for pictures that the other kinds do not cover. A chart is data:
+//! it is drawn as SVG here, and by a script in a page.
 
 use serde::Serialize;
 
@@ -13,9 +13,9 @@ use super::{Disc, Mark, Style, colour};
 
 /// Width of the sheet in pixels.
 pub(super) const WIDTH: f64 = 860.0;
-/// Height of the sheet in pixels: of equal axes, and of others.
+/// Height of the sheet in pixels, with equal axes and otherwise.
 const HEIGHTS: [f64; 2] = [620.0, 440.0];
-/// Room for one entry of the legend, in pixels.
+/// Height of one legend entry, in pixels.
 const ROW: f64 = 21.0;
 
 /// Curves over common axes.
@@ -27,7 +27,7 @@ pub struct Chart {
     pub x: Scaling,
     /// The y axis.
     pub y: Scaling,
-    /// Whether a pixel means the same on both axes.
+    /// Whether both axes have the same scale.
     pub equal: bool,
     /// The curves.
     pub curves: Vec<Curve>,
@@ -44,24 +44,24 @@ pub struct Chart {
 pub struct Scaling {
     /// Label with the unit.
     pub label: String,
-    /// Whether it is logarithmic, of absolute values.
+    /// Whether it is logarithmic, showing absolute values.
     pub logarithmic: bool,
-    /// The range shown; default everything.
+    /// The range shown; by default everything.
     pub range: Option<[f64; 2]>,
 }
 
 impl Scaling {
-    /// A linear axis over everything.
+    /// A linear axis that shows everything.
     pub fn linear(label: impl Into<String>) -> Self {
         Self { label: label.into(), ..Self::default() }
     }
 
-    /// A logarithmic axis over everything.
+    /// A logarithmic axis that shows everything.
     pub fn logarithmic(label: impl Into<String>) -> Self {
         Self { label: label.into(), logarithmic: true, ..Self::default() }
     }
 
-    /// The same axis over this range.
+    /// The same axis with this range.
     pub fn over(self, low: f64, high: f64) -> Self {
         Self { range: Some([low, high]), ..self }
     }
@@ -84,7 +84,7 @@ impl Scaling {
 pub struct Curve {
     /// Legend entry; empty for none.
     pub label: String,
-    /// Points along x; what is not finite breaks the line.
+    /// Points along x; a value that is not finite breaks the line.
     pub x: Vec<f64>,
     /// Points along y, as many as in `x`.
     pub y: Vec<f64>,
@@ -94,14 +94,14 @@ pub struct Curve {
     pub colour: usize,
     /// Whether each point is marked too.
     pub dots: bool,
-    /// A point with the start marker, and one with the arrival marker.
+    /// Points that get the start marker and the arrival marker.
     pub ends: [Option<[f64; 2]>; 2],
 }
 
 impl Curve {
-    /// The same curve with about `limit` points, in seven digits; extremes stay.
+    /// The same curve thinned to about `limit` points of seven digits; extremes are kept.
     pub fn thinned(mut self, limit: usize) -> Self {
-        // Over a rising x, such as time, only y has extremes.
+        // Along an increasing x, such as time, only y has extremes.
         let rising = self.x.is_sorted();
         let kept = if rising { decimate(&[&self.y], limit) } else { decimate(&[&self.x, &self.y], limit) };
         let rounded = |values: &[f64]| kept.iter().map(|&k| seven_digits(values[k])).collect();
@@ -110,7 +110,7 @@ impl Curve {
     }
 }
 
-/// `value` to seven significant digits: far more than a picture shows.
+/// `value` rounded to seven significant digits, far more than a picture shows.
 pub fn seven_digits(value: f64) -> f64 {
     format!("{value:.6e}").parse().unwrap_or(value)
 }
@@ -196,7 +196,7 @@ pub(super) fn draw(chart: &Chart, canvas: &mut Canvas) -> Result<(), String> {
     Ok(())
 }
 
-/// Whether a point lies in the rectangle, or as good as.
+/// Whether a point lies in the rectangle, up to round-off.
 fn inside(area: [f64; 4], (x, y): &(f64, f64)) -> bool {
     (area[0]..=area[2]).contains(x) && (area[1] - 1.0..=area[3] + 1.0).contains(y)
 }
@@ -260,7 +260,7 @@ mod tests {
         };
         let curves = vec![curve(Style::Points, "dots"), curve(Style::Crosses, "crosses")];
         let svg = crate::plot::chart(&Chart { curves, ..Chart::default() }, "test").expect("points");
-        // Two of the curve, and one in the legend.
+        // Two on the curve, and one in the legend.
         assert_eq!((svg.matches("h0").count(), svg.matches("l6 6m0 -6l-6 6").count()), (3, 3), "{svg}");
         assert_eq!(svg.matches("<path").count(), 4);
         assert!(!svg.contains("NaN"), "{svg}");

@@ -1,10 +1,10 @@
-//! Thinning of long series for drawing. Extremes stay: a spike of one sample is still in the
-//! picture.
+//! Thins long series for drawing. Extremes are kept, so a spike of one sample is still in the picture.
 
-/// Chooses the points of a curve to draw: about `limit` of them, rising, the first and the last always. The curve
-/// is given by its `channels` (equally long; x and y of a path, or only the values of a time series). It is cut
-/// into runs of equal length. Each run keeps its first point, its last, and in each channel the least and the
-/// greatest value. It also keeps its first point that is not finite, which breaks the line.
+/// Chooses about `limit` points of a curve to draw, in increasing order, always including the first and the
+/// last. The curve is given by its `channels` (equally long; x and y of a path, or only the values of a time
+/// series). It is cut into pieces of equal length. Each piece keeps its first point, its last, and in each
+/// channel the least and the greatest value. It also keeps its first point that is not finite, which breaks
+/// the line.
 pub fn decimate(channels: &[&[f64]], limit: usize) -> Vec<usize> {
     let length = channels.iter().map(|c| c.len()).min().unwrap_or(0);
     if length <= limit.max(2) {

@@ -1,4 +1,4 @@
-//! The legend: a column right of the axes, so that it never covers data.
+//! The legend, a column to the right of the axes, so that it never covers data.
 
 use super::canvas::{Anchor, Canvas, INK, Pen, Point, text_width};
 
@@ -6,10 +6,10 @@ use super::canvas::{Anchor, Canvas, INK, Pen, Point, text_width};
 const SIZE: f64 = 12.0;
 /// Height of an entry in pixels.
 const ROW: f64 = 21.0;
-/// Width of the key in pixels.
+/// Width of the symbol in pixels.
 const KEY: f64 = 26.0;
 
-/// The key before the text of an entry.
+/// The symbol before the text of an entry.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Key {
     Line(Pen),
@@ -17,7 +17,7 @@ pub(super) enum Key {
     Dot(Pen),
     /// A cross.
     Cross(Pen),
-    /// Fill colour, its opacity, and the rim.
+    /// Fill colour, its opacity, and the outline.
     Patch([u8; 3], f64, Pen),
     Start,
     Arrival,
@@ -26,7 +26,7 @@ pub(super) enum Key {
 /// An entry.
 pub(super) type Entry = (Key, String);
 
-/// The width a column of these entries needs, in pixels, about; 0 for none.
+/// The approximate width in pixels of a column with these entries; 0 if there are none.
 pub(super) fn width(entries: &[Entry]) -> f64 {
     entries.iter().map(|(_, text)| KEY + 8.0 + text_width(text, SIZE)).fold(0.0, f64::max)
 }

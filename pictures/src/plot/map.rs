@@ -1,4 +1,4 @@
-//! Cells of a plane in the colours of what was found there.
+//! Cells of a plane, coloured by what was found there.
 
 use super::axes::Axes;
 use super::canvas::{Anchor, Canvas, INK, Pen, SAFE};
@@ -11,9 +11,9 @@ use super::{MapPlot, colour};
 pub(super) const WIDTH: f64 = 860.0;
 /// See [`WIDTH`].
 pub(super) const HEIGHT: f64 = 600.0;
-/// How much of what lies beneath a cell hides.
+/// Opacity of a cell over what lies beneath it.
 const OPACITY: f64 = 0.5;
-/// Places of the palette for what is not the first kind: it has the colour of safe sets, which is the third.
+/// Palette positions of all kinds except the first, which has the colour of safe sets, the third.
 const OTHERS: [usize; 5] = [1, 4, 3, 5, 6];
 
 pub(super) fn draw(plot: &MapPlot, canvas: &mut Canvas) -> Result<(), String> {
@@ -40,7 +40,7 @@ pub(super) fn draw(plot: &MapPlot, canvas: &mut Canvas) -> Result<(), String> {
     canvas.clipped(area, |canvas| {
         for (row, cells) in plot.cells.chunks(plot.columns).enumerate() {
             let mut column = 0;
-            // Cells of one kind beside each other are one rectangle.
+            // Adjacent cells of one kind form one rectangle.
             for run in cells.chunk_by(|a, b| a == b) {
                 let corner = |i: usize, j: usize| {
                     axes.place(x[0] + width * (column + i) as f64, y[0] + height * (row + j) as f64)

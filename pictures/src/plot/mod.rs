@@ -1,5 +1,5 @@
-//! Pictures of series as SVG files: paths in a plane and signals over time. Needs no system font
-//! and knows no FMU. Everything here takes plain numbers; labels carry the units.
+//! Draws series as SVG files: paths in a plane and signals over time. It needs no system font and knows no
+//! FMU. Everything here takes plain numbers; labels state the units.
 
 mod axes;
 mod canvas;
@@ -22,8 +22,8 @@ pub use chart::{Chart, Curve, Scaling, seven_digits};
 pub use decimate::decimate;
 pub use scale::extent;
 
-/// Colours told apart by colour-blind readers too (Okabe and Ito 2008, without the yellow that
-/// vanishes on white), for series in this order.
+/// Colours that colour-blind readers can distinguish (Okabe and Ito 2008, without the yellow that vanishes on
+/// white), in the order of the series.
 pub const PALETTE: [[u8; 3]; 7] = [
     [0, 114, 178],   // blue
     [213, 94, 0],    // vermillion
@@ -34,10 +34,10 @@ pub const PALETTE: [[u8; 3]; 7] = [
     [60, 60, 60],    // grey
 ];
 
-/// Name of a picture that has its file for itself.
+/// Name of a picture in a file of its own.
 const ALONE: &str = "plot";
 
-/// Points of a series that are drawn, about; more are thinned out without losing extremes.
+/// About how many points of a series are drawn; longer ones are thinned without losing extremes.
 pub const POINTS: usize = 2000;
 
 /// Paths in a plane, with equal axes.
@@ -62,7 +62,7 @@ pub struct PathPlot {
 pub struct Path {
     /// Legend entry; empty for none.
     pub label: String,
-    /// Points along x, in the unit of the axis; what is not finite breaks the line.
+    /// Points along x, in the unit of the axis; a value that is not finite breaks the line.
     pub x: Vec<f64>,
     /// Points along y, as many as in `x`.
     pub y: Vec<f64>,
@@ -85,12 +85,12 @@ pub struct Disc {
     pub obstacle: bool,
 }
 
-/// The colour of a set that is to be kept out of, or to be in.
+/// The colour of a set that must be avoided, or in which to stay.
 fn set_colour(obstacle: bool) -> [u8; 3] {
     if obstacle { colour(1) } else { canvas::SAFE }
 }
 
-/// Cells of a plane in the colours of what was found there.
+/// Cells of a plane, coloured by what was found there.
 #[derive(Clone, Debug, Default)]
 pub struct MapPlot {
     /// Title; empty for none.
@@ -99,15 +99,15 @@ pub struct MapPlot {
     pub x_label: String,
     /// Label of the y axis, with its unit.
     pub y_label: String,
-    /// From and to along x, in the unit of the axis, finite.
+    /// The ends along x, in the unit of the axis, finite.
     pub x: [f64; 2],
-    /// From and to along y.
+    /// The ends along y.
     pub y: [f64; 2],
     /// Number of cells along x.
     pub columns: usize,
-    /// The kind of each cell, row after row from below: a position in `kinds`.
+    /// The kind of each cell, row by row from the bottom: an index into `kinds`.
     pub cells: Vec<usize>,
-    /// What the kinds mean. The first has the colour of safe sets.
+    /// The meanings of the kinds. The first has the colour of safe sets.
     pub kinds: Vec<String>,
     /// Whether a unit has the same length on both axes; discs need it.
     pub equal: bool,
@@ -139,18 +139,18 @@ pub struct TimePlot {
 pub struct Series {
     /// Legend entry; empty for none.
     pub label: String,
-    /// Times in seconds, rising.
+    /// Times in seconds, increasing.
     pub time: Vec<f64>,
-    /// Values in the unit of the axis, as many as times; what is not finite breaks the line.
+    /// Values in the unit of the axis, as many as times; a value that is not finite breaks the line.
     pub values: Vec<f64>,
     /// Style of the line.
     pub style: Style,
-    /// Position in [`PALETTE`]; default the number of the series. Give a reference and the signal that follows it
-    /// the same.
+    /// Index into [`PALETTE`]; by default the index of the series. Give a reference and the signal that
+    /// follows it the same colour.
     pub colour: Option<usize>,
 }
 
-/// Styles of a line. Points without one are for charts only.
+/// Styles of a line. Styles without a line are only for charts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Style {
@@ -159,7 +159,7 @@ pub enum Style {
     Solid,
     /// In dashes: references, profiles.
     Dashed,
-    /// Held from point to point: sampled inputs. In a path the same as solid.
+    /// Each value held until the next point: sampled inputs. In a path, the same as solid.
     Steps,
     /// No line: a dot at each point.
     Points,
@@ -181,9 +181,9 @@ pub struct Mark {
 pub struct Region {
     /// Legend entry; empty for none.
     pub label: String,
-    /// From and to, in seconds; infinite for the whole picture.
+    /// Start and end in seconds; infinite for the whole picture.
     pub time: [f64; 2],
-    /// From and to, in the unit of the y axis; infinite for the whole picture.
+    /// Lower and upper end in the unit of the y axis; infinite for the whole picture.
     pub values: [f64; 2],
 }
 
@@ -193,10 +193,10 @@ pub enum Scale {
     /// Linear, over all values.
     #[default]
     Linear,
-    /// Linear, between these two percentiles (0 to 100) of all values; the picture says so and tells the
+    /// Linear, between these two percentiles (0 to 100) of all values; the picture says so and gives the
     /// extremes.
     Percentiles(f64, f64),
-    /// Linear, between these two values; the picture says so where values lie beyond.
+    /// Linear, between these two values; the picture says so if values lie beyond.
     Fixed(f64, f64),
     /// The logarithm of absolute values; zeros break the line.
     Logarithmic,
@@ -233,7 +233,7 @@ pub fn time(plot: &TimePlot, file: &File) -> Result<(), Error> {
     times(std::slice::from_ref(plot), file)
 }
 
-/// Draws several [`TimePlot`]s over one time axis, one below the other, into the SVG file `file`.
+/// Draws several [`TimePlot`]s with a common time axis, one below the other, into the SVG file `file`.
 ///
 /// # Errors
 ///
@@ -244,8 +244,8 @@ pub fn times(plots: &[TimePlot], file: &File) -> Result<(), Error> {
     canvas.save(file)
 }
 
-/// Draws a [`Chart`] as an SVG document. `name` (letters, digits, `-` and `_`) begins its ids, so that several can
-/// stand in one page, and names it in messages.
+/// Draws a [`Chart`] as an SVG document. `name` (letters, digits, `-` and `_`) is the prefix of its ids, so
+/// that a page can contain several charts. Messages use it too.
 ///
 /// # Errors
 ///

@@ -12,7 +12,7 @@ use crate::outlines::Outline;
 pub(super) const WIDTH: f64 = 860.0;
 /// See [`WIDTH`].
 pub(super) const HEIGHT: f64 = 640.0;
-/// Share of the range left free at each side.
+/// Fraction of the range left free at each side.
 const MARGIN: f64 = 0.06;
 
 pub(super) fn draw(plot: &PathPlot, canvas: &mut Canvas) -> Result<(), String> {
@@ -79,7 +79,7 @@ fn entries(plot: &PathPlot) -> Vec<Entry> {
     entries
 }
 
-/// Axes over these extents of x and y, one pixel meaning the same length on both.
+/// Axes that show these extents of x and y, with the same scale on both.
 pub(super) fn equal_axes([x, y]: [Option<(f64, f64)>; 2], area: [f64; 4]) -> Result<Axes, String> {
     let (Some(x), Some(y)) = (x, y) else { return Err("there is no finite point".to_owned()) };
     let (width, height) = (area[2] - area[0], area[3] - area[1]);
@@ -92,7 +92,7 @@ pub(super) fn equal_axes([x, y]: [Option<(f64, f64)>; 2], area: [f64; 4]) -> Res
     };
     let (x, y) = (around(x, width), around(y, height));
     let count = |pixels: f64| (pixels / 75.0) as usize;
-    // The same ticks on both axes: their number follows from the longer one.
+    // Both axes have the same tick spacing, which the longer one determines.
     let step = Axis::linear(x.0, x.1, count(width), false);
     let spacing = if step.ticks.len() > 1 { step.ticks[1].0 - step.ticks[0].0 } else { x.1 - x.0 };
     let y_axis = Axis::linear(y.0, y.1, ((y.1 - y.0) / spacing * (1.0 + 1e-6)).ceil() as usize, false);

@@ -1,4 +1,4 @@
-//! From values to pixels along one axis: the range shown, its ticks and their labels.
+//! Maps values to pixels along one axis: the range shown, its ticks and their labels.
 
 use punctual_core::elementary;
 
@@ -9,20 +9,20 @@ pub(super) struct Axis {
     pub(super) low: f64,
     /// See `low`.
     pub(super) high: f64,
-    /// Whether values are drawn by their logarithm.
+    /// Whether values are drawn logarithmically.
     pub(super) logarithmic: bool,
     /// Ticks with their labels.
     pub(super) ticks: Vec<(f64, String)>,
 }
 
 impl Axis {
-    /// A linear axis over at least `low` to `high` with about `count` ticks. With `widen` the ends
-    /// move out to the next tick.
+    /// A linear axis that shows at least `low` to `high` with about `count` ticks. With `widen` the ends move
+    /// out to the next tick.
     pub(super) fn linear(low: f64, high: f64, count: usize, widen: bool) -> Self {
         let (mut low, mut high) = if low < high {
             (low, high)
         } else {
-            // A constant is shown in the middle of a range of its own size.
+            // A constant is shown in the middle of a range as wide as its magnitude.
             let half = if low == 0.0 { 1.0 } else { low.abs() / 2.0 };
             (low - half, low + half)
         };
@@ -37,7 +37,8 @@ impl Axis {
         Self { low, high, logarithmic: false, ticks }
     }
 
-    /// A logarithmic axis over at least `low` to `high` (0 < low ≤ high), ends at powers of ten.
+    /// A logarithmic axis that shows at least `low` to `high` (0 < low ≤ high), with its ends at powers of
+    /// ten.
     pub(super) fn logarithmic(low: f64, high: f64) -> Self {
         let mut from = (elementary::log10(low) + 1e-9).floor() as i32;
         let mut to = (elementary::log10(high) - 1e-9).ceil() as i32;
@@ -52,7 +53,7 @@ impl Axis {
         Self { low: elementary::powi(10.0, from), high: elementary::powi(10.0, to), logarithmic: true, ticks }
     }
 
-    /// The position of `value`: 0 at the low end, 1 at the high end; NaN where it has no place.
+    /// The position of `value`: 0 at the low end, 1 at the high end; NaN if it has none.
     pub(super) fn fraction(&self, value: f64) -> f64 {
         if self.logarithmic {
             if value == 0.0 {
@@ -66,7 +67,7 @@ impl Axis {
     }
 }
 
-/// The number of the form 1, 2 or 5 times a power of ten that is nearest to `rough` (> 0).
+/// The number closest to `rough` (> 0) among 1, 2 or 5 times a power of ten.
 fn nice_step(rough: f64) -> f64 {
     let power = elementary::powf(10.0, elementary::log10(rough).floor());
     let factor = match rough / power {
@@ -78,7 +79,7 @@ fn nice_step(rough: f64) -> f64 {
     factor * power
 }
 
-/// A tick label with the digits that `step` needs and a true minus sign.
+/// A tick label with the digits that `step` requires and a true minus sign.
 fn label(value: f64, step: f64) -> String {
     let largest = value.abs().max(step);
     let text = if largest >= 1e6 || step < 1e-4 {
@@ -96,7 +97,7 @@ fn label(value: f64, step: f64) -> String {
     if zero { text.trim_start_matches('-').to_owned() } else { text.replace('-', "−") }
 }
 
-/// A whole number in raised digits.
+/// An integer in superscript digits.
 pub(super) fn superscript(number: i32) -> String {
     const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
     let raise = |c: char| c.to_digit(10).map_or('⁻', |d| DIGITS[d as usize]);
@@ -111,7 +112,7 @@ pub fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     })
 }
 
-/// The values at two percentiles (0 to 100) of the finite ones.
+/// The values at two percentiles (0 to 100) of the finite values.
 pub(super) fn percentiles(values: impl IntoIterator<Item = f64>, low: f64, high: f64) -> Option<(f64, f64)> {
     let mut sorted: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
     sorted.sort_unstable_by(f64::total_cmp);

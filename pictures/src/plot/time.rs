@@ -1,4 +1,4 @@
-//! Signals over time, in one panel or several over one time axis.
+//! Signals over time, in one panel or in several with a common time axis.
 
 use punctual_core::elementary;
 
@@ -11,13 +11,13 @@ use super::{POINTS, Scale, Series, Style, TimePlot, colour};
 
 /// Width of the sheet in pixels.
 pub(super) const WIDTH: f64 = 900.0;
-/// Height of a single panel with everything around it, in pixels.
+/// Height of a single panel with its surroundings, in pixels.
 const SINGLE: f64 = 460.0;
-/// Height of each of several panels, in pixels.
+/// Height of each panel if there are several, in pixels.
 const PANEL: f64 = 290.0;
-/// Room below the last panel, in pixels.
+/// Space below the last panel, in pixels.
 const BOTTOM: f64 = 58.0;
-/// Most decades shown on a logarithmic axis.
+/// The most decades shown on a logarithmic axis.
 const DECADES: f64 = 12.0;
 
 /// Height of the sheet for these panels.
@@ -28,7 +28,7 @@ pub(super) fn height(plots: &[TimePlot]) -> f64 {
     }
 }
 
-/// Height of each of these panels. A single one keeps it where its legend is longer.
+/// Height of each of these panels. A single one does not grow with its legend.
 fn panel(plots: &[TimePlot]) -> f64 {
     match plots {
         [_] => SINGLE - BOTTOM,
@@ -36,12 +36,12 @@ fn panel(plots: &[TimePlot]) -> f64 {
     }
 }
 
-/// Height of a panel's legend, with what stands above it.
+/// Height of a panel's legend, with what is above it.
 fn with_legend(plot: &TimePlot) -> f64 {
     above(plot) + legend::height(&entries(plot)) + 8.0
 }
 
-/// Room for the title and the notes above a panel.
+/// Space for the title and the notes above a panel.
 fn above(plot: &TimePlot) -> f64 {
     let title = if plot.title.is_empty() { 14.0 } else { 40.0 };
     let is_noted = plot.instants.iter().any(|mark| !mark.label.is_empty())
@@ -107,7 +107,8 @@ fn draw_panel(plot: &TimePlot, axes: &Axes, canvas: &mut Canvas, last: bool) {
             continue;
         }
         canvas.line(&[(left, y), (right, y)], dashed);
-        // Only one label is drawn where several would cover one another, as of both bounds on a logarithmic axis.
+        // Only one label is drawn if several would overlap, such as those of both bounds on a logarithmic
+        // axis.
         if labelled.iter().all(|other| (other - y).abs() > 14.0) {
             let above = if y - top > 18.0 { y - 9.0 } else { y + 10.0 };
             canvas.text(&mark.label, (right - 6.0, above), 12.0, Anchor::Right, MARK);
@@ -131,13 +132,13 @@ fn entries(plot: &TimePlot) -> Vec<Entry> {
     entries
 }
 
-/// The y axis, and a note where values lie beyond it.
+/// The y axis, and a note if values lie beyond it.
 fn y_axis(plot: &TimePlot, height: f64) -> Result<(Axis, Option<String>), String> {
     let values = || plot.series.iter().flat_map(|s| s.values.iter().copied());
     let bounds = || plot.bounds.iter().map(|mark| mark.at);
     let (low, high) = extent(values()).ok_or("there is no finite value")?;
     let count = ((height / 45.0) as usize).max(2);
-    // An axis over a range and the bounds. Its ends are ticks, but bounds stand clear of the frame.
+    // An axis for a range and the bounds. It ends at ticks, with a margin between the bounds and the frame.
     let linear = |(low, high): (f64, f64)| {
         let (from, to) = extent([low, high].into_iter().chain(bounds())).unwrap_or((low, high));
         let axis = Axis::linear(from, to, count, true);
@@ -157,7 +158,7 @@ fn y_axis(plot: &TimePlot, height: f64) -> Result<(Axis, Option<String>), String
         Scale::Linear => (whole(), None),
         Scale::Percentiles(from, to) => {
             let bulk = percentiles(values(), from, to).unwrap_or((low, high));
-            // Cutting off less than a third of the range gains nothing.
+            // Clipping less than a third of the range gains nothing.
             if bulk.1 - bulk.0 > (high - low) / 1.5 || bulk.0 >= bulk.1 {
                 return Ok((whole(), None));
             }
@@ -167,14 +168,14 @@ fn y_axis(plot: &TimePlot, height: f64) -> Result<(Axis, Option<String>), String
         Scale::Logarithmic => {
             let sizes = || values().map(f64::abs).filter(|size| *size > 0.0);
             let high = extent(sizes().chain(bounds().map(f64::abs))).map_or(1.0, |range| range.1);
-            // A signal that passes through zero must not stretch the axis without end.
+            // A signal that crosses zero must not stretch the axis without limit.
             let low = percentiles(sizes(), 1.0, 100.0).map_or(0.1, |range| range.0);
             (Axis::logarithmic(low.max(high * elementary::powf(10.0, -DECADES)), high), None)
         }
     })
 }
 
-/// A number in three digits, with a true minus sign.
+/// A number with three digits and a true minus sign.
 fn brief(value: f64) -> String {
     let size = value.abs();
     let text = if size == 0.0 || (0.01..1e5).contains(&size) {
@@ -209,7 +210,8 @@ mod tests {
         assert!(axis.high > 31_000.0 && note.is_none());
     }
 
-    /// However many signals there are, each is named within the picture, and no panel's names reach into the next one.
+    /// However many signals there are, the picture has a legend entry for each, and no panel's legend reaches
+    /// into the next panel.
     #[test]
     fn the_sheet_has_room_for_every_name() {
         let named = |count: usize| {

@@ -1,5 +1,5 @@
-//! A campaign as one page of HTML: success over what was varied, arrivals against the deadline, the worst runs and how
-//! to see them again.
+//! A campaign as one HTML page: success over the varied quantities, arrivals against the deadline, the worst
+//! runs and how to replay them.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -20,45 +20,45 @@ use crate::plot::{self, Chart, Curve, Mark, Scaling, Style, seven_digits};
 const SCRIPT: &str = include_str!("campaign.js");
 const STYLE: &str = include_str!("campaign.css");
 
-/// Numbers that a page holds for its points, about.
+/// About how many numbers a page stores for its points.
 const NUMBERS: usize = 60_000;
-/// The fewest runs that are drawn where there are more.
+/// The fewest runs that are drawn if there are more.
 const FEWEST: usize = 500;
-/// One run in so many that are drawn may be a later one, which did not succeed.
+/// For this many of the first runs, one later run that did not succeed may be drawn as well.
 const LATER: usize = 4;
-/// Bars of a histogram, about.
+/// About how many bars a histogram has.
 const BARS: f64 = 30.0;
-/// Parts of equal size in which the rates of success are compared.
+/// Number of groups of equal size whose success rates are compared.
 const PARTS: usize = 5;
-/// Room beside what is drawn, as a part of it.
-const ROOM: f64 = 0.04;
+/// Margin beside the data, as a fraction of their extent.
+const MARGIN: f64 = 0.04;
 
-/// What is made of a campaign.
+/// The output for a campaign.
 pub struct Pages {
     /// The page, as HTML.
     pub page: String,
-    /// Success over two quantities, as SVG; `None` where fewer than two differ from run to run.
+    /// Success over two quantities, as SVG; `None` if fewer than two differ from run to run.
     pub picture: Option<String>,
 }
 
-/// What the script draws.
+/// The data that the script draws.
 #[derive(Serialize)]
 struct Scene {
     axes: Vec<Axis>,
-    /// The axes that are shown first.
+    /// The axes that are shown initially.
     shown: Option<[usize; 2]>,
     /// The numbers of the runs that are drawn.
     runs: Vec<u64>,
-    /// Whether they succeeded.
+    /// Whether each of them succeeded.
     good: Vec<bool>,
-    /// How many of them are the first ones.
+    /// How many of them are the first runs of the campaign.
     first: usize,
-    /// The command that makes a run again, before its number and after it.
+    /// The command that replays a run: the text before its number and after it.
     again: [String; 2],
     arrivals: Vec<Arrivals>,
 }
 
-/// A number that differs from run to run.
+/// A quantity that differs from run to run.
 #[derive(Serialize)]
 struct Axis {
     label: String,
@@ -79,7 +79,7 @@ struct Arrivals {
     chart: Option<Chart>,
 }
 
-/// Chooses the runs that are drawn: the first ones, and some later ones without success.
+/// Chooses the runs that are drawn: the first ones, and some later ones that did not succeed.
 #[derive(Default)]
 struct Sample {
     /// The number of first ones.
@@ -89,7 +89,7 @@ struct Sample {
 }
 
 impl Sample {
-    /// Takes the next run, whose number is `run`; says whether it is drawn.
+    /// Decides whether the next run, whose number is `run`, is drawn.
     fn take(&mut self, run: u64, succeeded: bool) -> bool {
         let room = if succeeded { self.budget } else { self.budget + self.budget / LATER };
         let is_drawn = self.runs.len() < room;
@@ -100,13 +100,14 @@ impl Sample {
         is_drawn
     }
 
-    /// How many of them are the first ones.
+    /// How many of them are the first runs of the campaign.
     fn first(&self) -> usize {
         self.runs.len().min(self.budget)
     }
 }
 
-/// Draws the campaign of the file `file`, whose rows are in `reader`; `results` is the path of that file.
+/// Makes the page of the campaign in `file`, whose rows are in `reader`; `results` is the path of the file
+/// with the rows.
 ///
 /// # Errors
 ///
@@ -126,7 +127,7 @@ pub fn pages(
     let mut sample = Sample { budget: (NUMBERS / axes.len().max(1)).max(FEWEST), ..Sample::default() };
     let mut counts: Vec<Counts> =
         measures.barriers().filter_map(|barrier| Counts::new(barrier, campaign, &find, summary)).collect();
-    // Go through the rows once more.
+    // Read the rows once more.
     let mut run = 0;
     for group in 0..reader.groups() {
         for row in reader.group(group, columns)? {
@@ -146,7 +147,7 @@ pub fn pages(
     let quoted =
         if results.contains(char::is_whitespace) { format!("{results:?}") } else { results.to_owned() };
     let again = [format!("punctual replay {quoted} --run "), " --out out".to_owned()];
-    // The page.
+    // Write the page.
     let mut body = head(file, campaign, summary);
     if shown.is_some() {
         body += &over_two(&axes, shown, summary, &sample);
@@ -176,7 +177,8 @@ pub fn pages(
     Ok(Pages { page, picture: picture.transpose()? })
 }
 
-/// The numbers that differ from run to run, what was varied first. A seed means nothing by its size.
+/// The quantities that differ from run to run, with the varied ones first. The magnitude of a seed means
+/// nothing, so seeds are left out.
 fn axes(campaign: &Campaign, measures: &Measures, summary: &Summary) -> Vec<Axis> {
     let differs = |name: &str| {
         summary
@@ -201,7 +203,7 @@ fn axes(campaign: &Campaign, measures: &Measures, summary: &Summary) -> Vec<Axis
     numbers.filter(|(_, column)| differs(&column.name)).filter_map(axis).collect()
 }
 
-/// The two axes to begin with: of what was varied those on which success depends most in the first runs.
+/// The two axes shown initially: the varied quantities on which success depends most in the first runs.
 fn shown(axes: &[Axis], good: &[bool]) -> Option<[usize; 2]> {
     let mut varied: Vec<(usize, f64)> = (0..axes.len())
         .filter(|&a| axes[a].is_varied)
@@ -215,8 +217,8 @@ fn shown(axes: &[Axis], good: &[bool]) -> Option<[usize; 2]> {
     Some(pair)
 }
 
-/// How much the rate of success differs between parts of the runs with the least `values`, the next, and so on: Pearson's
-/// chi-squared, but for a factor that all values share.
+/// How much the success rate differs between groups of runs sorted by `values`: Pearson's chi-squared, up to
+/// a common factor.
 fn dependence(values: &[f64], good: &[bool]) -> f64 {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
@@ -255,23 +257,23 @@ fn value(row: &Row, column: usize) -> Option<f64> {
     }
 }
 
-/// Counts of arrivals at a barrier, in bars that begin and end at its deadline.
+/// Histogram of the arrivals at a barrier, with bars that begin and end at its deadline.
 struct Counts {
     barrier: String,
-    /// The deadline in s, or the column that has it where it is varied.
+    /// The deadline in s, or its column if it is varied.
     deadline: Result<f64, usize>,
-    /// The first instant of the runs in s, from which deadlines count.
+    /// The start time of the runs in s, from which deadlines count.
     start: f64,
     arrival: usize,
     on_time: usize,
     /// The width of a bar in s.
     width: f64,
-    /// Runs by their bars after the deadline: those on time, and the others.
+    /// Number of runs by bar, counted from the deadline: those on time, and the others.
     bars: [BTreeMap<i64, u64>; 2],
 }
 
 impl Counts {
-    /// Counts for `barrier`, if it has a deadline.
+    /// The histogram of `barrier`, if it has a deadline.
     fn new(
         barrier: &str,
         campaign: &Campaign,
@@ -308,7 +310,8 @@ impl Counts {
         let (Some(arrival), Some(deadline)) = (value(row, self.arrival), deadline) else { return };
         let after = (arrival - self.start - deadline) / self.width;
         let is_late = !matches!(row[self.on_time], Cell::Flag(true));
-        // A bar ends with the deadline, at which an arrival is on time; round-off must not carry it over.
+        // A bar ends at the deadline, and an arrival then is on time. Round-off must not move it to the next
+        // bar.
         let bar = if is_late { (after.ceil() as i64 - 1).max(0) } else { (after.ceil() as i64 - 1).min(-1) };
         *self.bars[usize::from(is_late)].entry(bar).or_default() += 1;
     }
@@ -332,7 +335,7 @@ impl Counts {
                 let mut curve =
                     Curve { label: label.to_owned(), style: Style::Steps, colour, ..Curve::default() };
                 let (first, last) = (*bars.keys().next()?, *bars.keys().next_back()?);
-                // An outline begins and ends on the ground.
+                // An outline begins and ends at zero.
                 let heights = (first..=last).map(|bar| (bar, bars.get(&bar).copied().unwrap_or_default()));
                 for (bar, height) in std::iter::once((first, 0)).chain(heights).chain([(last + 1, 0)]) {
                     curve.x.push(seven_digits(place(bar)));
@@ -342,11 +345,11 @@ impl Counts {
             };
             let highest = self.bars.iter().flat_map(BTreeMap::values).max().copied().unwrap_or(1) as f64;
             let (low, high) = (place(first).min(at), place(last + 1).max(at));
-            let room = ROOM * (high - low);
+            let room = MARGIN * (high - low);
             let words = [("on time", 0), ("late", 1)];
             Chart {
                 x: Scaling::linear(label).over(low - room, high + room),
-                y: Scaling::linear("runs").over(0.0, (1.0 + ROOM) * highest),
+                y: Scaling::linear("runs").over(0.0, (1.0 + MARGIN) * highest),
                 curves: self
                     .bars
                     .iter()
@@ -361,7 +364,7 @@ impl Counts {
     }
 }
 
-/// The deadline of `barrier` in s, where it is the same for all runs.
+/// The deadline of `barrier` in s, if it is the same for all runs.
 fn deadline(barrier: &str, campaign: &Campaign) -> Option<f64> {
     let components = campaign.system().components().iter().zip(campaign.models());
     let find =
@@ -373,13 +376,13 @@ fn deadline(barrier: &str, campaign: &Campaign) -> Option<f64> {
     components.filter_map(find).next().filter(|deadline| deadline.is_finite())
 }
 
-/// The next of 1, 2, 5, 10 and so on.
+/// The next number of the series 1, 2, 5, 10 and so on.
 fn round(width: f64) -> f64 {
     let power = elementary::powf(10.0, elementary::log10(width).floor());
     [1.0, 2.0, 5.0].map(|factor| factor * power).into_iter().find(|w| *w >= width).unwrap_or(10.0 * power)
 }
 
-/// A part of 1 in percent. Only all is 100 %, and only nothing is 0 %.
+/// A fraction in percent. Only all of it is 100 %, and only none is 0 %.
 fn percent(part: f64) -> String {
     let digits = (2..=9).find(|&digits| {
         let shown = format!("{:.digits$}", 100.0 * part);
@@ -389,7 +392,7 @@ fn percent(part: f64) -> String {
     format!("{}\u{202f}%", text.trim_end_matches('0').trim_end_matches('.'))
 }
 
-/// The heading: what was run, and how many runs succeed.
+/// The heading: what was run, and how many runs succeeded.
 fn head(file: &str, campaign: &Campaign, summary: &Summary) -> String {
     let components = campaign.system().components().iter().zip(campaign.models()).map(|(component, part)| {
         let (name, model) = (&component.name, &part.description().model_name);
@@ -444,7 +447,7 @@ fn head(file: &str, campaign: &Campaign, summary: &Summary) -> String {
     html
 }
 
-/// A choice of one of `names`.
+/// A selection among `names`.
 fn select<'a>(id: &str, label: &str, names: impl Iterator<Item = (usize, &'a str)>, chosen: usize) -> String {
     let option = |(value, name): (usize, &str)| {
         let chosen = if value == chosen { " selected=\"\"" } else { "" };
@@ -453,7 +456,7 @@ fn select<'a>(id: &str, label: &str, names: impl Iterator<Item = (usize, &'a str
     format!("<label>{label} <select id=\"{id}\">{}</select></label>\n", names.map(option).collect::<String>())
 }
 
-/// Success over two quantities, which the reader chooses.
+/// Success over two quantities that the reader selects.
 fn over_two(axes: &[Axis], shown: Option<[usize; 2]>, summary: &Summary, sample: &Sample) -> String {
     let [x, y] = shown.unwrap_or_default();
     let choose = |id: &str, label: &str, chosen: usize| {
@@ -482,7 +485,7 @@ fn over_two(axes: &[Axis], shown: Option<[usize; 2]>, summary: &Summary, sample:
     )
 }
 
-/// The worst runs, and how to see them again.
+/// The worst runs, and how to replay them.
 fn worst(campaign: &Campaign, measures: &Measures, cases: &[Case], again: &[String; 2]) -> String {
     if cases.is_empty() {
         return String::new();
@@ -521,7 +524,7 @@ fn worst(campaign: &Campaign, measures: &Measures, cases: &[Case], again: &[Stri
     )
 }
 
-/// What differs from run to run, and how it was drawn.
+/// What is varied, and how it was drawn.
 fn varied(campaign: &Campaign) -> String {
     let sampling = match campaign.sampling() {
         Sampling::Random => "random",
@@ -563,7 +566,7 @@ mod tests {
     fn success_that_depends_on_a_value_is_found() {
         let count = 400_u32;
         let good: Vec<bool> = (0..count).map(|k| k % 20 < 10).collect();
-        // The first decides, in the middle of its range too; the second has nothing to do with it.
+        // Success depends on the first, with a threshold inside its range; the second is irrelevant.
         let decides: Vec<f64> =
             good.iter().enumerate().map(|(k, good)| if *good { k as f64 % 7.0 } else { -9.0 }).collect();
         let other: Vec<f64> = (0..count).map(|k| f64::from(k * 7919 % 401)).collect();

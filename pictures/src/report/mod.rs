@@ -1,5 +1,5 @@
-//! A run as one page of HTML: what became of each promise, the path as an animation, h and the inputs over time. And a
-//! [`campaign`] as one.
+//! A run as one HTML page: the verdict on each promise, the path as an animation, h and the inputs over time.
+//! Also a [`campaign`] as a page.
 
 pub mod campaign;
 mod scene;
@@ -19,24 +19,24 @@ use scene::{Outline, Strip, Vehicle};
 const SCRIPT: &str = include_str!("run.js");
 const STYLE: &str = include_str!("run.css");
 
-/// The parts of the x axis of a plane that are left free at each side.
-const ROOM: f64 = 0.06;
+/// Margin at each side of a plane, as a fraction of its x axis.
+const MARGIN: f64 = 0.06;
 
-/// What the script moves.
+/// The data that the script animates.
 #[derive(Default, Serialize)]
 struct Scene {
     /// First and last time in s.
     time: [f64; 2],
     vehicles: Vec<Vehicle>,
     outlines: Vec<Outline>,
-    /// The status of filters, by the key of its place.
+    /// The status of each filter, with the key of its place in the page.
     strips: Vec<(String, Strip)>,
-    /// Barriers without an outline, since they read more than the place.
+    /// Barriers without an outline, because they read more than the position.
     #[serde(skip)]
     left_out: Vec<String>,
 }
 
-/// The page of the run of `system`, the file `file`. Its components are made of `models`.
+/// The page of a run of `system`, which is in `file`. Its components are made from `models`.
 pub fn document(
     file: &str,
     system: &System,
@@ -97,17 +97,17 @@ pub fn document(
     Page { title: &title, body: &body, charts, style: STYLE, script: &script }.document()
 }
 
-/// What the reader can do.
+/// Instructions for the reader.
 const HINT: &str = "<p class=\"hint\">Play the run below, or click into a chart over time to go there. Point at a curve to read \
     it off; drag to zoom (two fingers on a phone), double-click to see all again.</p>\n";
 
-/// What the reader moves the time with.
+/// The controls of the time.
 const CONTROLS: &str = "<div class=\"controls\"><button type=\"button\" id=\"play\" aria-label=\"play\">\u{25b6}</button>\
     <input type=\"range\" id=\"time\" aria-label=\"time in s\" /><output id=\"clock\" for=\"time\"></output>\
     <div id=\"now\"></div></div>\n\
     <noscript><p>The charts need JavaScript. The pictures beside this page do not.</p></noscript>\n";
 
-/// The heading: what ran, and what became of it.
+/// The heading: what ran, and how it ended.
 fn head(file: &str, parts: &[Part<'_>], outcome: &Outcome, notes: &[String]) -> String {
     let promises = &outcome.promises;
     let mut html = format!("<h1>{}</h1>\n<p>", escape(file));
@@ -146,7 +146,7 @@ fn head(file: &str, parts: &[Part<'_>], outcome: &Outcome, notes: &[String]) -> 
 /// The verdict on each promise.
 fn verdicts(parts: &[Part<'_>], outcome: &Outcome, (worst, sentence): (Kept, String)) -> String {
     let promises = &outcome.promises;
-    // Only a filter that follows plans guarantees anything.
+    // Only a filter that follows backup plans guarantees anything.
     let guaranteed: Vec<Option<bool>> =
         promises.iter().map(|p| guaranteed(parts, p, &outcome.recording)).collect();
     let plans = guaranteed.iter().any(Option::is_some);
@@ -174,7 +174,7 @@ fn verdicts(parts: &[Part<'_>], outcome: &Outcome, (worst, sentence): (Kept, Str
     )
 }
 
-/// The inputs against their limits.
+/// The extremes of the inputs against their limits.
 fn peaks(parts: &[Part<'_>], recording: &Recording) -> String {
     let filters = parts.iter().filter(|part| !part.barriers().is_empty());
     let all = filters.flat_map(|part| part.inputs().into_iter().map(move |input| (part, input)));
@@ -230,13 +230,14 @@ fn class(kept: Kept) -> &'static str {
     }
 }
 
-/// `signal` without its component, where only one filter is in the system.
+/// `signal` without its component if the system has only one filter.
 fn shown<'a>(parts: &[Part<'_>], signal: &'a str) -> &'a str {
     let filters = parts.iter().filter(|part| !part.barriers().is_empty()).count();
     signal.split_once('.').filter(|_| filters == 1).map_or(signal, |(_, variable)| variable)
 }
 
-/// Whether the promise was guaranteed at the first sample; `None` where its filter follows no plans, or it was not recorded.
+/// Whether the promise was guaranteed at the first sample; `None` if its filter follows no plans or it was
+/// not recorded.
 fn guaranteed(parts: &[Part<'_>], promise: &Promise, recording: &Recording) -> Option<bool> {
     let (component, barrier) = promise.barrier.split_once('.')?;
     let part = parts.iter().find(|part| part.component.name == component)?;
@@ -245,7 +246,7 @@ fn guaranteed(parts: &[Part<'_>], promise: &Promise, recording: &Recording) -> O
     recording.column(index).next().map(|flag| flag != 0.0)
 }
 
-/// The paths, and into `scene` what moves along them.
+/// The chart of the paths; adds the moving objects to `scene`.
 fn plane(parts: &[Part<'_>], outcome: &Outcome, scene: &mut Scene) -> Option<Chart> {
     let recording = &outcome.recording;
     let vehicles: Vec<Vehicle> = parts.iter().flat_map(|part| Vehicle::all(part, recording)).collect();
@@ -276,15 +277,15 @@ fn plane(parts: &[Part<'_>], outcome: &Outcome, scene: &mut Scene) -> Option<Cha
             outlines.extend(expressions.into_iter().map(Outline::still));
             scene.left_out.extend(left_out.iter().map(|name| shown(parts, &part.signal(name)).to_owned()));
         }
-        // What covers all else lies beneath.
+        // Unbounded sets are drawn first, beneath all others.
         outlines.sort_by_key(|outline| !outline.endless);
     }
     let [x, y] = [0, 1].map(|axis| {
         let (low, high) = all(extents.clone(), axis)?;
-        let room = ROOM * (high - low).max(1e-9 * size);
+        let room = MARGIN * (high - low).max(1e-9 * size);
         Some([low - room, high + room])
     });
-    // With several vehicles it is not known whose arrival it is.
+    // With several vehicles, it is unknown whose arrival it is.
     let arrival = outcome.promises.iter().find(|p| p.deadline.is_some()).and_then(|p| p.arrival);
     let arrival = arrival.filter(|_| vehicles.len() == 1);
     let curve = |(i, vehicle): (usize, &Vehicle)| {
@@ -312,7 +313,7 @@ fn curve(recording: &Recording, signal: &str, label: &str, colour: usize, style:
     Some(Curve { label: label.to_owned(), x, y, colour, style, ..Curve::default() }.thinned(POINTS))
 }
 
-/// The time of all charts: the run, and the deadlines that do not lie far behind it.
+/// The time axis of all charts: the run, and the deadlines that are not long after it.
 fn time_axis(outcome: &Outcome) -> Scaling {
     let axis = Scaling::linear("time (s)");
     let Some((first, last)) = plot::extent(outcome.recording.times().iter().copied()) else { return axis };
@@ -341,7 +342,7 @@ fn barriers(parts: &[Part<'_>], part: &Part<'_>, outcome: &Outcome) -> Vec<Chart
             let label = shown(parts, &name);
             let Some(h) = curve(recording, &signal("h"), label, colour, Style::Solid) else { continue };
             chart.curves.push(h);
-            // Without a label it goes with h.
+            // It shares the legend entry of h.
             chart.curves.extend(curve(recording, &signal("profile"), "", colour, Style::Dashed));
             colour += 1;
             let promise = outcome.promises.iter().find(|p| p.barrier == name);
@@ -369,7 +370,7 @@ fn inputs(parts: &[Part<'_>], part: &Part<'_>, outcome: &Outcome) -> Vec<Chart> 
         let solid = curve(recording, &signal, shown(parts, &name), 0, Style::Steps)?;
         let dashed = curve(recording, &part.signal(&format!("u_ref.{input}")), "", 0, Style::Dashed);
         let limits = part.limits(input);
-        // What is wanted may be far beyond the limits; u itself is to be seen.
+        // u_ref may be far beyond the limits; the axis is to show u itself.
         let range = match limits {
             [Some(low), Some(high)] if low < high => {
                 let span = high - low;

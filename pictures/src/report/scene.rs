@@ -1,4 +1,4 @@
-//! What moves on the page: vehicles, the outlines of barriers, and the status of filters over time.
+//! The moving parts of the page: vehicles, the outlines of barriers, and the status of filters over time.
 
 use punctual_core::filter::Status;
 use punctual_cosim::recording::Recording;
@@ -9,7 +9,7 @@ use crate::drawing::Part;
 use crate::outlines;
 use crate::plot::{self, POINTS};
 
-/// The states that are a heading, in rad from the x axis.
+/// The name of a state that is a heading, in rad from the x axis.
 const HEADING: &str = "x.theta";
 
 /// A vehicle that moves in a plane.
@@ -22,12 +22,12 @@ pub(super) struct Vehicle {
     time: Vec<f64>,
     x: Vec<f64>,
     y: Vec<f64>,
-    /// Its heading in rad; empty where it has none.
+    /// Its heading in rad; empty if it has none.
     heading: Vec<f64>,
 }
 
 impl Vehicle {
-    /// All that `part` moves, of the signals recorded.
+    /// All vehicles of `part` whose signals are recorded.
     pub(super) fn all(part: &Part<'_>, recording: &Recording) -> Vec<Self> {
         let vehicle = |(label, place): (String, [String; 2])| {
             let (x, y) = (recording.series(&place[0])?, recording.series(&place[1])?);
@@ -46,14 +46,14 @@ impl Vehicle {
         [&self.x, &self.y].map(|values| plot::extent(values.iter().copied()))
     }
 
-    /// Where it is at `time`, or at its next point.
+    /// Its position at `time`, or at the next point in time.
     pub(super) fn at(&self, time: f64) -> Option<[f64; 2]> {
         let i = self.time.iter().position(|t| *t >= time)?;
         Some([self.x[i], self.y[i]])
     }
 }
 
-/// The values at `kept`, as far as there are any.
+/// The values at the indices `kept` that exist.
 fn chosen(all: &[f64], kept: &[usize]) -> Vec<f64> {
     kept.iter().filter_map(|&k| all.get(k)).map(|&value| plot::seven_digits(value)).collect()
 }
@@ -64,16 +64,16 @@ pub(super) struct Outline {
     pub(super) label: String,
     /// Whether its outside is the safe set.
     obstacle: bool,
-    /// Its closed lines, seen from its centre.
+    /// Its closed lines, relative to its centre.
     rings: Vec<Vec<[f64; 2]>>,
-    /// Times, and x and y of its centre at them; one of each where it stays.
+    /// Times, and x and y of its centre at these times; only one of each if it does not move.
     centre: [Vec<f64>; 3],
-    /// Whether it goes on for ever, as a half-plane.
+    /// Whether it is unbounded, such as a half-plane.
     pub(super) endless: bool,
 }
 
 impl Outline {
-    /// The outlines of the shapes of `part`. `size` is that of what else is in the plane.
+    /// The outlines of the shapes of `part`. `size` is the size of everything else in the plane.
     pub(super) fn all(part: &Part<'_>, recording: &Recording, size: f64) -> Vec<Self> {
         let Some(filter) = part.filter() else { return Vec::new() };
         let outline = |section: &BarrierSection| {
@@ -84,7 +84,7 @@ impl Outline {
         filter.barrier.iter().filter_map(outline).collect()
     }
 
-    /// The outline of an expression, where it is.
+    /// The outline of an expression, which does not move.
     pub(super) fn still(outline: outlines::Outline) -> Self {
         Self::at(outline, [vec![0.0], vec![0.0], vec![0.0]])
     }
@@ -95,7 +95,7 @@ impl Outline {
         Self { label, obstacle, rings, centre, endless }
     }
 
-    /// The least and the greatest x and y at all times; of an endless one, of the point that its line is given by.
+    /// The least and the greatest x and y at all times; for an unbounded one, those of the point on its line.
     pub(super) fn extent(&self) -> [Option<(f64, f64)>; 2] {
         [0, 1].map(|axis| {
             let (low, high) = plot::extent(self.centre[axis + 1].iter().copied())?;
@@ -106,8 +106,8 @@ impl Outline {
     }
 }
 
-/// Where the centre of a barrier is in the course of the run: as recorded where it is an input, else as it moves by
-/// itself. `None` where it is an input that something feeds and that was not recorded.
+/// The trajectory of a barrier's centre during the run: as recorded if it is an input, else its own motion.
+/// `None` if it is an input that was not recorded.
 fn centre(part: &Part<'_>, section: &BarrierSection, recording: &Recording) -> Option<[Vec<f64>; 3]> {
     let name = |field: &str, axis: usize| format!("{}.{field}[{axis}]", section.name);
     let seen = [1, 2].map(|axis| recording.series(&part.signal(&name("centre", axis))));
@@ -134,14 +134,14 @@ fn centre(part: &Part<'_>, section: &BarrierSection, recording: &Recording) -> O
 #[derive(Serialize)]
 pub(super) struct Strip {
     label: String,
-    /// From when which status lasts, a position in `words`.
+    /// The time from which each status lasts, and its index into `words`.
     parts: Vec<(f64, usize)>,
-    /// The words that occur, and their colours as positions in the palette.
+    /// The statuses that occur, and their colours as indices into the palette.
     words: Vec<(String, usize)>,
 }
 
 impl Strip {
-    /// The strip of `part`, called `label`, where its status was recorded.
+    /// The strip of `part` with this `label`, if its status was recorded.
     pub(super) fn new(part: &Part<'_>, label: &str, recording: &Recording) -> Option<Self> {
         let description = part.model.description();
         let items = &description.variables[description.index_of("status")?].items;
@@ -161,8 +161,8 @@ impl Strip {
     }
 }
 
-/// The times at which the status changes, and what it is from then on. Of samples that lie too close to be told apart in a
-/// picture the gravest counts.
+/// The times at which the status changes, with the new status. Of samples too close to distinguish in a
+/// picture, the most serious one counts.
 fn changes(times: &[f64], seen: &[f64]) -> Vec<(f64, i32)> {
     let together = seen.len().div_ceil(POINTS).max(1);
     let gravest =
@@ -174,7 +174,8 @@ fn changes(times: &[f64], seen: &[f64]) -> Vec<(f64, i32)> {
     changes
 }
 
-/// How much a status matters to a reader: what the filter left alone least, then what it did, then what it could not do.
+/// How serious a status is for the reader: least if the filter changed nothing, more if it acted, most if it
+/// could not act.
 fn gravity(status: i32) -> i32 {
     match Status::from_number(status) {
         Some(Status::Unchanged) => 0,
@@ -185,7 +186,7 @@ fn gravity(status: i32) -> i32 {
     }
 }
 
-/// The colour of a status, a position in [`plot::PALETTE`].
+/// The colour of a status, an index into [`plot::PALETTE`].
 fn colour(status: i32) -> usize {
     match Status::from_number(status) {
         Some(Status::Unchanged) => 2,
@@ -206,7 +207,7 @@ mod tests {
     fn a_status_of_one_sample_is_seen_in_a_long_run() {
         let times: Vec<f64> = (0..100_000).map(f64::from).collect();
         let number = |status: Status| f64::from(status as u8);
-        // It goes back and forth at every sample, as at the edge of a set.
+        // The status alternates at every sample, as at the edge of a set.
         let mut seen: Vec<f64> =
             (0..times.len()).map(|k| number([Status::Unchanged, Status::Filtered][k % 2])).collect();
         assert_eq!(changes(&times, &seen), [(0.0, Status::Filtered as i32)]);
@@ -214,7 +215,7 @@ mod tests {
         let found = changes(&times, &seen);
         let graver: Vec<_> =
             found.iter().filter(|(_, status)| *status == Status::Infeasible as i32).collect();
-        // 50 samples are one.
+        // 50 samples merge into one.
         assert_eq!(graver, [&(77_750.0, Status::Infeasible as i32)]);
         assert_eq!(found.len(), 3);
         assert_eq!(changes(&times[..4], &seen[..4]).len(), 4, "a short run is drawn as it is");

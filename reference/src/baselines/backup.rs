@@ -1,5 +1,5 @@
-//! What [`Gatekeeper`](super::Gatekeeper) and [`BackupBarrier`](super::BackupBarrier) fall back on: a controller, and the
-//! set in which it keeps.
+//! The backup of [`Gatekeeper`](super::Gatekeeper) and [`BackupBarrier`](super::BackupBarrier): a controller,
+//! and the set that it keeps.
 
 use std::array::from_fn;
 
@@ -11,29 +11,29 @@ use punctual_core::scalar::Scalar;
 
 /// A feedback law.
 pub trait Law<const NX: usize, const NU: usize> {
-    /// Its input at `x`, within the bounds of whoever uses it.
+    /// The input at `x`, within the bounds of the backup that uses it.
     fn input<S: Scalar>(&self, x: &[S; NX]) -> [S; NU];
 }
 
-/// Brakes: −gain · v on the first `M` inputs, together no longer than `limit`, and 0 on the others.
+/// A braking law: −gain · v on the first `M` inputs, with a norm of at most `limit`, and 0 on the others.
 ///
-/// Input i < `M` has to be the rate of the state `speeds[i]`. The path until rest is then no longer than
+/// Input i < `M` must be the rate of the state `speeds[i]`. The path until rest is then at most
 /// |v|/gain + |v|²/(2 limit), with v the vector of these states.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Brake<const M: usize> {
     /// The states that are speeds, in m/s, counted from 0.
     pub speeds: [usize; M],
-    /// In 1/s, finite, > 0, and below the inverse of the period for which an input is held.
+    /// In 1/s, finite, > 0, and below the inverse of the hold period of an input.
     pub gain: f64,
-    /// Length of the input in m/s², finite, > 0.
+    /// Largest norm of the input in m/s², finite, > 0.
     pub limit: f64,
 }
 
 impl<const M: usize> Brake<M> {
-    /// Speed in m/s that is added where the length of v has no derivative.
+    /// A small speed in m/s that makes the norm of v differentiable at 0.
     const SMALL: f64 = 1e-3;
 
-    /// The path in m until rest, from above, with a derivative everywhere.
+    /// An upper bound in m on the path until rest, differentiable everywhere.
     pub fn path<S: Scalar, const NX: usize>(&self, x: &[S; NX]) -> S {
         let square = self.square(x) + Self::SMALL * Self::SMALL;
         square.sqrt() / self.gain + square / (2.0 * self.limit)
@@ -53,13 +53,13 @@ impl<const M: usize, const NX: usize, const NU: usize> Law<NX, NU> for Brake<M> 
     }
 }
 
-/// The part of `set` in which [`Brake`] comes to rest: h less the path until then. The gradient of h along the
-/// position must be no longer than 1, as that of a distance is.
+/// The part of `set` from which [`Brake`] comes to rest inside: h minus the path until rest. The norm of the
+/// gradient of h along the position must be at most 1, as that of a distance is.
 #[derive(Clone, Copy, Debug)]
 pub struct Stoppable<B, const M: usize> {
     /// The set, h in m.
     pub set: B,
-    /// What brakes.
+    /// The braking law.
     pub brake: Brake<M>,
 }
 
@@ -69,30 +69,31 @@ impl<B: Barrier<NX>, const M: usize, const NX: usize> Barrier<NX> for Stoppable<
     }
 }
 
-/// A controller to fall back on, the set that it keeps, and the model that both are run in.
+/// A backup controller, the set that it keeps, and the model in which both are simulated.
 ///
-/// Safe is h ≥ 0 for one set at rest. In the terminal set the law keeps h ≥ 0 for ever, by the choice of whoever sets
-/// both up: see [`Stoppable`]. Neither method knows a deadline, or a set that is to be reached.
+/// A state is safe if h ≥ 0, for one set at rest. In the terminal set the law keeps h ≥ 0 forever; whoever
+/// sets up both must ensure this, see [`Stoppable`]. Neither method supports a deadline or a set to be
+/// reached.
 #[derive(Clone, Copy, Debug)]
 pub struct Backup<P, L, B, C> {
     /// The model.
     pub plant: P,
-    /// What is done where the nominal controller cannot be followed.
+    /// The law used when the nominal controller cannot be followed.
     pub law: L,
-    /// What is kept.
+    /// The set to keep.
     pub safe: B,
-    /// Where the law keeps it for ever.
+    /// The set in which the law keeps it forever.
     pub terminal: C,
-    /// Bounds on the inputs. The law keeps them.
+    /// Bounds on the inputs, which the law must respect.
     pub bounds: Bounds,
-    /// Time in s for which an input is held, and between two points of a path, finite, > 0.
+    /// Hold period of an input, and time between two points of a trajectory, in s, finite, > 0.
     pub period: f64,
-    /// Periods within which the law has to reach the terminal set, ≥ 1.
+    /// Periods within which the law must reach the terminal set, ≥ 1.
     pub horizon: usize,
 }
 
 impl<P, L, B, C> Backup<P, L, B, C> {
-    /// The same, its numbers checked.
+    /// The same backup, with its numbers checked.
     ///
     /// # Errors
     ///
@@ -115,13 +116,13 @@ impl<P, L, B, C> Backup<P, L, B, C> {
         rk4(|x| self.plant.derivative(x, u), x, self.period)
     }
 
-    /// `u` within the bounds.
+    /// `u` clamped to the bounds.
     pub(super) fn bounded<const NU: usize>(&self, u: &[f64; NU]) -> [f64; NU] {
         from_fn(|i| self.bounds.clamp(i, u[i]))
     }
 
-    /// Whether the law leads from `x` at `t` into the terminal set within the horizon, and is safe at every sample on
-    /// the way. From there on it is safe by the choice of that set.
+    /// Whether the law leads from `x` at `t` into the terminal set within the horizon, and is safe at every
+    /// sample before. From there on it is safe by the choice of that set.
     pub fn saves<const NX: usize, const NU: usize>(&self, t: f64, x: &[f64; NX]) -> bool
     where
         P: ControlAffine<NX, NU>,

@@ -12,16 +12,16 @@ use punctual_core::{MAX_INPUTS, MAX_ROWS};
 
 use super::backup::{Backup, Law};
 
-/// The input nearest to u_ref under d/dt h(φ(τ, x)) ≥ −α h(φ(τ, x)) for τ on a grid, and the same of the terminal set at
-/// its end. φ(τ, x) is where the backup leads from x in the time τ.
+/// The input closest to u_ref such that d/dt h(φ(τ, x)) ≥ −α h(φ(τ, x)) for τ on a grid, and the same for the
+/// terminal set at the end of the grid. φ(τ, x) is the state to which the backup leads from x in the time τ.
 ///
-/// The derivatives are ∇h Dφ (f + g u), exact along the flow with held inputs. There is no row for τ = 0: where the
-/// relative degree is above 1, no input is in it. The safe set that it keeps is that of the states from which the backup
-/// is safe until the end of the grid and in the terminal set there. As in the source, the rows are those of continuous
-/// time. Nothing accounts for held inputs, or for times between those of the grid.
+/// The derivatives are ∇h Dφ (f + g u), exact along the flow with held inputs. There is no row for τ = 0,
+/// since for a relative degree above 1 it contains no input. The method keeps the set of states from which
+/// the backup is safe until the end of the grid and in the terminal set there. As in the source, the rows are
+/// those of continuous time. They do not account for held inputs, or for times between grid points.
 ///
-/// It promises h ≥ 0 where the start is in that set, the rows can be met, and samples are dense. It can be asked for no
-/// set that the start is outside of, and for no deadline.
+/// It promises h ≥ 0 if the start is in that set, the rows can be met, and samples are dense. It supports no
+/// start outside the set, and no deadline.
 ///
 /// # References
 ///
@@ -37,11 +37,12 @@ pub struct BackupBarrier<P, L, B, C> {
 /// A step of a [`BackupBarrier`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BackedUp<const NU: usize> {
-    /// The input: that of the quadratic program, or of the backup where its rows cannot be met.
+    /// The input: that of the quadratic program, or that of the backup if the rows cannot be met.
     pub input: [f64; NU],
     /// Whether the rows were met.
     pub met: bool,
-    /// The least of h along the backup and of the terminal set at its end, in the unit of h: ≥ 0 in the set that is kept.
+    /// The least value of h along the backup and of the terminal set's barrier at its end, in the unit of h:
+    /// ≥ 0 in the set that is kept.
     pub least: f64,
 }
 
@@ -50,7 +51,7 @@ impl<P, L, B, C> BackupBarrier<P, L, B, C> {
     ///
     /// # Errors
     ///
-    /// A rate out of range. A horizon with more rows than a quadratic program may have.
+    /// A rate out of range, or a horizon with more rows than a quadratic program may have.
     pub fn new(backup: Backup<P, L, B, C>, rate: f64) -> Result<Self, Error> {
         if backup.horizon >= MAX_ROWS {
             let message = format!("is {} periods, must be < {MAX_ROWS}", backup.horizon);
@@ -59,7 +60,7 @@ impl<P, L, B, C> BackupBarrier<P, L, B, C> {
         Ok(Self { backup, rate: positive("rate", rate)?, workspace: Workspace::default() })
     }
 
-    /// The input at time `t` and state `x` nearest to `u_ref`.
+    /// The input closest to `u_ref` at time `t` and state `x`.
     pub fn step<const NX: usize, const NU: usize>(
         &mut self,
         t: f64,
@@ -73,7 +74,8 @@ impl<P, L, B, C> BackupBarrier<P, L, B, C> {
         C: Barrier<NX>,
     {
         let (drift, map) = (self.backup.plant.drift(x), self.backup.plant.input_map(x));
-        // The rate of every value is that along f, and that along each column of g times its input.
+        // The rate of every value is its rate along f plus, for each column of g, the rate along it times the
+        // input.
         let along_drift = self.along(t, x, &drift);
         let mut rows: Vec<Row> = along_drift
             .iter()
@@ -96,8 +98,8 @@ impl<P, L, B, C> BackupBarrier<P, L, B, C> {
         BackedUp { input, met, least }
     }
 
-    /// h and its derivative along `direction` of x at every point of the backup's grid but the first, and at its end
-    /// those of the terminal set.
+    /// h and its derivative along `direction` at every grid point of the backup except the first, and those
+    /// of the terminal set's barrier at its end.
     fn along<const NX: usize, const NU: usize>(
         &self,
         t: f64,
@@ -131,20 +133,20 @@ mod tests {
     #[test]
     fn stops_before_the_wall_that_it_is_pushed_into() {
         let mut filter = BackupBarrier::new(backup(), 2.0).expect("valid");
-        let way = driven([0.0, 0.0], 900, |t, x| {
+        let trajectory = driven([0.0, 0.0], 900, |t, x| {
             let step = filter.step(t, x, &[LIMIT]);
             assert!(step.least > -1e-3 && step.input[0].abs() <= LIMIT, "{step:?} at {x:?}");
             step.input
         });
-        let last = way.last().expect("a way").0;
-        assert!(way.iter().all(|(x, _)| x[0] <= WALL));
+        let last = trajectory.last().expect("a trajectory").0;
+        assert!(trajectory.iter().all(|(x, _)| x[0] <= WALL));
         assert!(last[1].abs() < 1e-2 && last[0] > WALL - 0.1, "{last:?}");
-        // Further away than any push within the rate can matter, u_ref is left alone.
-        assert_eq!(way[0].1[0], LIMIT);
+        // At this distance no input within the limit matters, so u_ref is unchanged.
+        assert_eq!(trajectory[0].1[0], LIMIT);
     }
 
-    /// Below the limit the brake is v̇ = −k v, held over the period: v falls by the factor 1 − kδ in each, and x moves
-    /// by v δ (1 − kδ/2). So the rate of each row is known.
+    /// Below the limit the brake is v̇ = −k v, held over the period. In each period v falls by the factor 1 −
+    /// kδ, and x moves by v δ (1 − kδ/2). So the rate of each row is known.
     #[test]
     fn the_rows_are_those_of_the_flow() {
         let backup = backup();

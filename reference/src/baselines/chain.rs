@@ -7,13 +7,13 @@ use punctual_core::error::{Error, ErrorKind, length, positive};
 use punctual_core::jet::Taylor;
 use punctual_core::scalar::Scalar;
 
-/// An extended class-K function α: increasing, α(0) = 0.
+/// An extended class-K function α: increasing, with α(0) = 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ClassK {
     /// p s, p in 1/s, finite, > 0.
     Linear(f64),
-    /// p |s|^q sign s with p finite, > 0, in `[s]`^(1−q)/s, and q finite, > 0. With q in (0, 1) it reaches zero
-    /// in finite time, and its derivative grows beyond all bounds there.
+    /// p |s|^q sign s with p finite, > 0, in `[s]`^(1−q)/s, and q finite, > 0. For q in (0, 1) it reaches
+    /// zero in finite time, where its derivative is unbounded.
     Power {
         /// p.
         gain: f64,
@@ -46,13 +46,14 @@ impl ClassK {
 
 /// ψ_0 = h, ψ_i = ψ̇_{i−1} + α_i(ψ_{i−1}), and ψ_n ≥ 0, with class-K functions α_1 … α_n.
 ///
-/// Where ψ_i(t₀) ≥ 0 for all i < n, it keeps all of them so. From outside:
+/// If ψ_i(t₀) ≥ 0 for all i < n, it keeps all of them nonnegative. From outside:
 ///
-/// - Linear functions are Π (D + p_i) h ≥ 0, the constraint of [`Exponential`](super::Exponential): no deadline.
-/// - Powers with q_i in (0, 1) bring ψ_{n−1}, then ψ_{n−2}, … and last h to zero in finite time. Each takes at
-///   most |ψ_{i−1}|^{1−q_i}/(p_i (1 − q_i)) from where the one before it has arrived. [`Self::reach_time`] is the
-///   sum of these at the start. It bounds the arrival where no ψ_i, i < n, falls below its value at the start. A
-///   power is not Lipschitz at 0: near ψ_i = 0 the floor under h⁽ⁿ⁾ has the term p q |ψ|^{q−1} ψ̇.
+/// - Linear functions give Π (D + p_i) h ≥ 0, the constraint of [`Exponential`](super::Exponential), without
+///   a deadline.
+/// - Powers with q_i in (0, 1) bring ψ_{n−1}, then ψ_{n−2}, … and finally h to zero in finite time. Each
+///   takes at most |ψ_{i−1}|^{1−q_i}/(p_i (1 − q_i)) after the one before has arrived. [`Self::reach_time`]
+///   is the sum of these at the start. It bounds the arrival if no ψ_i, i < n, falls below its initial value.
+///   A power is not Lipschitz at 0: near ψ_i = 0, the floor under h⁽ⁿ⁾ has the term p q |ψ|^{q−1} ψ̇.
 ///
 /// # References
 ///
@@ -68,7 +69,7 @@ pub struct Chain {
 }
 
 impl Chain {
-    /// With these α_1 … α_n, as many as the relative degree.
+    /// A chain of these α_1 … α_n, as many as the relative degree.
     ///
     /// # Errors
     ///
@@ -82,12 +83,12 @@ impl Chain {
         Ok(Self { n, functions: kept })
     }
 
-    /// With checked functions.
+    /// A chain of checked functions.
     pub(super) fn of(n: usize, functions: [ClassK; MAX_RELATIVE_DEGREE]) -> Self {
         Self { n, functions }
     }
 
-    /// With linear functions of these gains p_1 … p_n in 1/s.
+    /// A chain of linear functions with these gains p_1 … p_n in 1/s.
     ///
     /// # Errors
     ///
@@ -96,11 +97,11 @@ impl Chain {
         Self::new(&gains.iter().map(|&p| ClassK::Linear(p)).collect::<Vec<_>>())
     }
 
-    /// With powers of these gains p_i and exponents q_i in (0, 1).
+    /// A chain of powers with these gains p_i and exponents q_i in (0, 1).
     ///
     /// # Errors
     ///
-    /// As for [`Self::new`]; another number of exponents, or one that is not in (0, 1).
+    /// As for [`Self::new`]; different numbers of gains and exponents, or an exponent outside (0, 1).
     pub fn finite_time(gains: &[f64], exponents: &[f64]) -> Result<Self, Error> {
         length("exponents", exponents.len(), gains.len())?;
         for (i, &q) in exponents.iter().enumerate() {
@@ -113,15 +114,15 @@ impl Chain {
         Self::new(&gains.iter().zip(exponents).map(power).collect::<Vec<_>>())
     }
 
-    /// ψ_0 … ψ_{n−1} from h⁽ʲ⁾, j < n; zeros above.
+    /// ψ_0 … ψ_{n−1} computed from h⁽ʲ⁾, j < n; zeros beyond.
     pub fn psi(&self, h: &[f64]) -> [f64; MAX_RELATIVE_DEGREE] {
         let mut values = [0.0; MAX_RELATIVE_DEGREE];
         self.run(h, &mut values);
         values
     }
 
-    /// Σ |ψ_{i−1}|^{1−q_i}/(p_i (1 − q_i)) in s over the links that are outside (ψ_{i−1} < 0) at h⁽ʲ⁾, j < n; infinite
-    /// where one of them has q_i ≥ 1.
+    /// Σ |ψ_{i−1}|^{1−q_i}/(p_i (1 − q_i)) in s over the links that start outside (ψ_{i−1} < 0) for h⁽ʲ⁾, j <
+    /// n; infinite if one of them has q_i ≥ 1.
     pub fn reach_time(&self, h: &[f64]) -> f64 {
         let psi = self.psi(h);
         let outside = self.functions[..self.n].iter().zip(psi).filter(|(_, psi)| *psi < 0.0);
@@ -134,9 +135,9 @@ impl Chain {
         times.sum()
     }
 
-    /// ψ_n where h⁽ⁿ⁾ = 0, and ψ_0 … ψ_{n−1} into `values`.
+    /// ψ_n for h⁽ⁿ⁾ = 0; also writes ψ_0 … ψ_{n−1} to `values`.
     fn run(&self, h: &[f64], values: &mut [f64; MAX_RELATIVE_DEGREE]) -> f64 {
-        // With n known to the compiler the short loops of the series unroll.
+        // With n known at compile time, the short loops of the series unroll.
         match self.n {
             1 => self.rest::<2>(h, values),
             2 => self.rest::<3>(h, values),
@@ -149,8 +150,8 @@ impl Chain {
         }
     }
 
-    /// [`Self::run`] for n = `K` − 1. h⁽ⁿ⁾ enters ψ_i through its own derivative of order n − i only, with
-    /// coefficient 1: α_i(ψ_{i−1}) is differentiated n − i times, which needs ψ_{i−1} up to that order.
+    /// [`Self::run`] for n = `K` − 1. h⁽ⁿ⁾ enters ψ_i only through its own derivative of order n − i, with
+    /// coefficient 1: α_i(ψ_{i−1}) is differentiated n − i times, which requires ψ_{i−1} up to that order.
     fn rest<const K: usize>(&self, h: &[f64], values: &mut [f64; MAX_RELATIVE_DEGREE]) -> f64 {
         let mut psi = Taylor::<f64, K>::constant(0.0);
         let mut factorial = 1.0;
@@ -161,8 +162,8 @@ impl Chain {
         for i in 0..self.n {
             values[i] = psi.coefficients[0];
             let image = self.functions[i].of(psi);
-            // Unknown coefficients are those of h⁽ⁿ⁾ = 0 or beyond. Of these only h⁽ⁿ⁾ = 0 itself reaches the
-            // value at the end.
+            // Unknown coefficients belong to h⁽ⁿ⁾ = 0 or higher orders. Of these, only h⁽ⁿ⁾ = 0 itself
+            // reaches the final value.
             for k in 0..K - 1 {
                 psi.coefficients[k] = (k + 1) as f64 * psi.coefficients[k + 1] + image.coefficients[k];
             }
@@ -216,8 +217,8 @@ mod tests {
         }
     }
 
-    /// h(t) = −(1 − t)⁴ solves ψ_1 = 0 with p = 4, q = 3/4, and so any chain behind it: its third derivative is
-    /// the floor of order 3.
+    /// h(t) = −(1 − t)⁴ solves ψ_1 = 0 with p = 4, q = 3/4, and so satisfies any chain that continues it: its
+    /// third derivative is the floor of order 3.
     #[test]
     fn a_solution_of_the_first_link_is_on_the_floor_of_order_three() {
         let functions = [
@@ -231,7 +232,7 @@ mod tests {
             let h = [-s.powi(4), 4.0 * s.powi(3), -12.0 * s * s];
             let found = floor(&chain, &h);
             assert!((found - 24.0 * s).abs() < 1e-12, "{found} at {t}");
-            // 1^{1/4}/(4 · 1/4) = 1 s from the start: it is exact for the first link alone.
+            // 1^{1/4}/(4 · 1/4) = 1 s from the start, which is exact for the first link alone.
             let first = Chain::new(&functions[..1]).expect("valid");
             assert!((first.reach_time(&h[..1]) - s).abs() < 1e-15);
         }

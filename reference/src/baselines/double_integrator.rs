@@ -1,4 +1,5 @@
-//! A known case for the tests of what falls back on a brake: ẍ = u with |u| ≤ 2 m/s² before a wall.
+//! A known example for the tests of methods with a braking backup: ẍ = u with |u| ≤ 2 m/s² in front of a
+//! wall.
 
 use punctual_core::barrier::Barrier;
 use punctual_core::dynamics::{ControlAffine, rk4_step};
@@ -9,7 +10,7 @@ use super::backup::{Backup, Brake, Stoppable};
 
 /// Bound on the input in m/s².
 pub(super) const LIMIT: f64 = 2.0;
-/// Place of the wall in m.
+/// Position of the wall in m.
 pub(super) const WALL: f64 = 10.0;
 /// Sampling period in s.
 pub(super) const PERIOD: f64 = 0.02;
@@ -47,7 +48,7 @@ pub(super) fn backup() -> Backup<Line, Brake<1>, Before, Stoppable<Before, 1>> {
     backup.validated().expect("valid")
 }
 
-/// `steps` states from `x` on with the inputs of `step`.
+/// `steps` states from `x` on, with the inputs that `step` returns.
 pub(super) fn driven(
     mut x: [f64; 2],
     steps: usize,

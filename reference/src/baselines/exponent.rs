@@ -9,19 +9,20 @@
 //! \end{aligned} \tag{F}
 //! ```
 //!
-//! with equality where the condition is active throughout, so e reaches zero at T exactly
-//! (`docs/theory.md#first-order-condition`). The condition is the reference profile r = e(0) (1 − τ/T)^{1/(1−p)} made a
-//! feedback of e. With the rate a = 1/((1 − p) T) in 1/s, α |e|^p = a |e(0)| (|e|/|e(0)|)^p.
+//! with equality if the condition is active throughout, so e reaches zero exactly at T
+//! (`docs/theory.md#first-order-condition`). The condition is the reference profile r = e(0) (1 −
+//! τ/T)^{1/(1−p)} written as feedback of e. With the rate a = 1/((1 − p) T) in 1/s, α |e|^p = a |e(0)|
+//! (|e|/|e(0)|)^p.
 //!
-//! The two differ after a disturbance. The profile pulls a lost error back at a rate of its own, so
-//! that it still arrives near T; (F) forgets it and arrives late by (|e|^{1−p} − |r|^{1−p})/((1 − p) α).
+//! The two differ after a disturbance. The profile corrects a lost error at a rate of its own, so it still
+//! arrives near T. (F) does not, and arrives late by (|e|^{1−p} − |r|^{1−p})/((1 − p) α).
 //!
 //! # Requirements
 //!
-//! Relative degree 1. The right-hand side is not Lipschitz at e = 0. Approached from below a held input
-//! can only overshoot into the set, by at most α |e|^p δ over a period δ; within
-//! (αδ)^{1/(1−p)} of zero, where that exceeds |e|, one step arrives. Above zero the same condition
-//! (ė ≥ −α e^p) lets e reach zero in finite time and a held input pass it, back and forth: chattering.
+//! Relative degree 1. The right-hand side is not Lipschitz at e = 0. Approached from below, a held input can
+//! only overshoot into the set, by at most α |e|^p δ over a period δ. Within (αδ)^{1/(1−p)} of zero, where
+//! that exceeds |e|, one step arrives. Above zero, the same condition (ė ≥ −α e^p) lets e reach zero in
+//! finite time, and a held input then crosses it back and forth: chattering.
 //!
 //! # References
 //!
@@ -47,8 +48,8 @@ impl Default for Exponent {
 }
 
 impl Exponent {
-    /// The exponent `p`. Near 0 the speed of approach is nearly constant; near 1 the approach starts
-    /// fast and ends gently: the initial rate |ė/e| is 1/((1 − p) T).
+    /// The exponent `p`. Near 0 the speed of approach is nearly constant. Near 1 the approach starts fast and
+    /// ends gently: the initial rate |ė/e| is 1/((1 − p) T).
     ///
     /// # Errors
     ///
@@ -71,7 +72,7 @@ impl Exponent {
         1.0 / ((1.0 - self.0) * deadline)
     }
 
-    /// The least ė allowed at `e` < 0 on the way from `anchor` = e(0) < 0, `[e]`/s; 0 for e ≥ 0.
+    /// The least ė allowed at `e` < 0 after a start at `anchor` = e(0) < 0, in `[e]`/s; 0 for e ≥ 0.
     pub fn floor(self, anchor: f64, deadline: f64, e: f64) -> f64 {
         if e >= 0.0 {
             return 0.0;
@@ -79,7 +80,8 @@ impl Exponent {
         -self.rate(deadline) * anchor * elementary::powf(e / anchor, self.0)
     }
 
-    /// The lower bound (F) on e at `elapsed` = τ ≥ 0 from `anchor` = e(0) < 0, `[e]`; 0 from T on.
+    /// The lower bound (F) on e at `elapsed` = τ ≥ 0 after a start at `anchor` = e(0) < 0, in `[e]`; 0 from T
+    /// on.
     pub fn lower_bound(self, anchor: f64, deadline: f64, elapsed: f64) -> f64 {
         anchor * elementary::powf((1.0 - elapsed / deadline).max(0.0), 1.0 / (1.0 - self.0))
     }
@@ -97,7 +99,7 @@ mod tests {
             assert!((p.floor(anchor, deadline, anchor) / anchor + p.rate(deadline)).abs() < 1e-15);
             for tau in [0.0, 0.4, 1.5, 2.9] {
                 let e = p.lower_bound(anchor, deadline, tau);
-                // Central difference of step 1e-5: its error is the third derivative times 2e-11.
+                // Central difference with step 1e-5, whose error is the third derivative times 2e-11.
                 let d = 1e-5;
                 let slope = (p.lower_bound(anchor, deadline, tau + d)
                     - p.lower_bound(anchor, deadline, tau - d))

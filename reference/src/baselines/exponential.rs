@@ -5,10 +5,10 @@ use punctual_core::MAX_RELATIVE_DEGREE;
 use punctual_core::convergence::operator::Operator;
 use punctual_core::error::Error;
 
-/// Π (D + a_i) h ≥ 0 with n positive rates, equal or not: no deadline.
+/// Π (D + a_i) h ≥ 0 with n positive rates, equal or not. It has no deadline.
 ///
-/// From outside, h ≥ h₀ e^{−at} P(t) tends to 0 and need not get there; with a margin μ, h reaches 0 within a
-/// time that grows with ln(|h₀|/μ)/a. Inside it keeps h ≥ 0 where [`Operator::is_invariant`] holds at the
+/// From outside, h ≥ h₀ e^{−at} P(t) tends to 0 but need not reach it. With a margin μ, h reaches 0 within a
+/// time that grows with ln(|h₀|/μ)/a. Inside, it keeps h ≥ 0 if [`Operator::is_invariant`] holds at the
 /// start.
 ///
 /// # References
@@ -20,12 +20,12 @@ use punctual_core::error::Error;
 pub struct Exponential(Operator);
 
 impl Exponential {
-    /// With the rates of `operator`, as many as the relative degree.
+    /// A condition with the rates of `operator`, as many as the relative degree.
     pub fn new(operator: Operator) -> Self {
         Self(operator)
     }
 
-    /// With `n` times the `rate` in 1/s, finite, > 0.
+    /// A condition with the same `rate` in 1/s, finite, > 0, `n` times.
     ///
     /// # Errors
     ///

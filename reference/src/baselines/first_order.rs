@@ -6,11 +6,11 @@ use punctual_core::MAX_RELATIVE_DEGREE;
 use punctual_core::elementary;
 use punctual_core::error::{Error, positive};
 
-/// ψ_1 = ḣ + α |h|^p sign h with α = |h₀|^{1−p}/((1 − p) T), such that h = 0 at T where ψ_1 = 0 throughout.
+/// ψ_1 = ḣ + α |h|^p sign h with α = |h₀|^{1−p}/((1 − p) T), so that h = 0 at T if ψ_1 = 0 throughout.
 ///
-/// For n = 1 it is ψ_1 ≥ 0, below and above zero. For n > 1 the
-/// constraint is (D + k)ⁿ⁻¹ ψ_1 ≥ 0, which is ours. It keeps the deadline where ψ_1 and its first n − 2
-/// derivatives start so that ψ_1 ≥ 0 from then on. A start at rest outside has ψ_1 < 0, and arrives later than T.
+/// For n = 1 the constraint is ψ_1 ≥ 0, below and above zero. For n > 1 it is (D + k)ⁿ⁻¹ ψ_1 ≥ 0, which is
+/// our extension. It keeps the deadline if ψ_1 and its first n − 2 derivatives start so that ψ_1 ≥ 0 from
+/// then on. A start at rest outside has ψ_1 < 0, and arrives later than T.
 ///
 /// # References
 ///
@@ -26,7 +26,8 @@ pub struct FirstOrderFixedTime {
 }
 
 impl FirstOrderFixedTime {
-    /// For relative degree `n`, with `rate` = k in 1/s, finite, > 0, for the orders above the first.
+    /// A condition for relative degree `n`, with `rate` = k in 1/s, finite, > 0, for the orders above the
+    /// first.
     ///
     /// # Errors
     ///
@@ -39,7 +40,7 @@ impl FirstOrderFixedTime {
 impl Condition for FirstOrderFixedTime {
     fn bound(&self, at: &Sample) -> Bound {
         let (p, anchor) = (self.exponent.get(), at.anchor[0]);
-        // On the boundary at the anchor nothing has to be reached, and any gain keeps it.
+        // On the boundary at the anchor, nothing has to be reached and any gain keeps it.
         let size = anchor.abs();
         let gain = if size > 0.0 {
             elementary::powf(size, 1.0 - p) * self.exponent.rate(at.deadline)
@@ -72,7 +73,7 @@ mod tests {
         assert_eq!(condition.bound(&Sample::new(&[-40.0], 3.0, 3.0, &[-1.0])).lower, 0.0);
     }
 
-    /// h(t) = −(1 − t/T)² solves ψ_1 = 0 for p = 1/2: its second derivative is on the floor.
+    /// h(t) = −(1 − t/T)² solves ψ_1 = 0 for p = 1/2, so its second derivative is on the floor.
     #[test]
     fn its_solution_is_on_the_floor_of_order_two() {
         let condition = FirstOrderFixedTime::new(2, Exponent::default(), 7.0).expect("valid");

@@ -1,5 +1,5 @@
-//! Baselines: constraints of the literature, to compare with. Each is a [`Condition`] that
-//! [`FilterBuilder::condition`](punctual_core::filter::FilterBuilder::condition) puts in the place of this
+//! Baselines: constraints of the literature, for comparison. Each is a [`Condition`] that
+//! [`FilterBuilder::condition`](punctual_core::filter::FilterBuilder::condition) uses in place of this
 //! project's methods.
 //!
 //! | condition | h⁽ⁿ⁾ ≥ φ such that | deadline | source |
@@ -10,17 +10,17 @@
 //! | [`FirstOrderFixedTime`] | ḣ + α \|h\|^p sign h ≥ 0 | T, for n = 1 | Bhat and Bernstein 2000; order n ours |
 //! | [`Tube`] | h + s(t) ≥ 0 kept, s shrinking to 0 | T | arXiv:2603.17003 for n = 1; order n ours |
 //!
-//! All but the tube are time-invariant. None accounts for the loss of a held input; the filter enforces them at
-//! the samples. With a margin μ in the settings all of them are conditions on h − μ.
+//! All but the tube are time-invariant. None accounts for the effect of a held input; the filter enforces
+//! them at the samples. With a margin μ in the settings, all of them are conditions on h − μ.
 //!
-//! Two methods are filters of their own, with a model that they run ahead under a [`Backup`]:
+//! Two methods are filters of their own, which simulate a model with a [`Backup`]:
 //!
 //! | filter | changes u_ref | source |
 //! |---|---|---|
-//! | [`Gatekeeper`] | where no longer nominal way has a backup behind it | Agrawal, Chen and Panagou, arXiv:2211.14361 |
-//! | [`BackupBarrier`] | as little as the rows along the backup ask | Gurriet et al. 2018; Chen et al. 2021 |
+//! | [`Gatekeeper`] | when no longer nominal trajectory has a backup | Agrawal, Chen and Panagou, arXiv:2211.14361 |
+//! | [`BackupBarrier`] | as little as the rows along the backup require | Gurriet et al. 2018; Chen et al. 2021 |
 //!
-//! They keep a set that the start is in, for ever and within the bounds. Neither has a deadline.
+//! They keep a set that contains the start, forever and within the bounds. Neither has a deadline.
 
 mod backup;
 mod backup_barrier;
@@ -46,7 +46,7 @@ pub use tube::Tube;
 use punctual_core::MAX_RELATIVE_DEGREE;
 use punctual_core::error::{Error, ErrorKind};
 
-/// Checks `n` as a number of links.
+/// Checks that `n` is a valid number of links.
 fn checked_order(field: &str, n: usize) -> Result<usize, Error> {
     if (1..=MAX_RELATIVE_DEGREE).contains(&n) {
         return Ok(n);

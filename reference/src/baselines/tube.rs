@@ -1,4 +1,4 @@
-//! A tube that constricts to the set by the deadline.
+//! A tube that shrinks to the set by the deadline.
 
 use super::{Bound, Condition, Sample, checked_order};
 use punctual_core::MAX_RELATIVE_DEGREE;
@@ -6,17 +6,18 @@ use punctual_core::convergence::comparison::{binomial, lower_terms};
 use punctual_core::elementary;
 use punctual_core::error::{Error, ErrorKind, positive};
 
-/// h + s(t) ≥ 0 is kept, with s(τ) = s₀ (1 − τ/T)ᵏ until T and 0 from then on: (D + a)ⁿ (h + s) ≥ 0.
+/// Keeps h + s(t) ≥ 0, with s(τ) = s₀ (1 − τ/T)ᵏ until T and 0 afterwards: (D + a)ⁿ (h + s) ≥ 0.
 ///
-/// For n = 1 this is the source's constraint L_f h + L_g h u + ṡ ≥ −a (h + s) with s₀ = max(0, −h₀), so that the
-/// start is in the tube. The schedule is ours (the source leaves it free, bounded); k ≥ n makes s⁽ⁿ⁾ bounded.
+/// For n = 1 this is the source's constraint L_f h + L_g h u + ṡ ≥ −a (h + s) with s₀ = max(0, −h₀), so that
+/// the tube contains the start. The schedule is ours (the source leaves it free, but bounded); k ≥ n makes
+/// s⁽ⁿ⁾ bounded.
 ///
-/// For n > 1, ours: the tube has to contain the start with its derivatives, (D + a)ⁱ(h + s) ≥ 0 at the anchor for
-/// every i < n. Each of these is linear in s₀, and the least s₀ ≥ 0 that meets all of them is taken. Then h ≥ −s
-/// throughout, and h ≥ 0 from T on. Where (D + a)ⁱ(1 − τ/T)ᵏ ≤ 0 at the anchor (aT too small for k) no s₀ may do.
-/// That condition is then left out, and nothing follows.
+/// For n > 1, our extension, the tube must contain the start with its derivatives: (D + a)ⁱ(h + s) ≥ 0 at the
+/// anchor for every i < n. Each of these is linear in s₀, and the least s₀ ≥ 0 that meets all of them is
+/// taken. Then h ≥ −s throughout, and h ≥ 0 from T on. If (D + a)ⁱ(1 − τ/T)ᵏ ≤ 0 at the anchor (aT too small
+/// for k), there may be no such s₀. That condition is then omitted, and nothing is guaranteed.
 ///
-/// Whether bounded inputs can follow the tube is tested by [`Self::least_deadline`], for n = 1 only.
+/// [`Self::least_deadline`] tests, only for n = 1, whether bounded inputs can follow the tube.
 ///
 /// # References
 ///
@@ -30,7 +31,7 @@ pub struct Tube {
 }
 
 impl Tube {
-    /// For relative degree `n`, with k = `power` in n ..= 2 n and a = `rate` in 1/s, finite, > 0.
+    /// A tube for relative degree `n`, with k = `power` in n ..= 2 n and a = `rate` in 1/s, finite, > 0.
     ///
     /// # Errors
     ///
@@ -71,14 +72,14 @@ impl Tube {
         needed.fold(0.0, f64::max)
     }
 
-    /// The shortest deadline in s for which bounded inputs can follow the tube of a start with h₀ = `anchor`, from every
-    /// state in it. `authority` is the least, over these states, of the largest ḣ that the bounds allow, in `[h]`/s.
-    /// `None` for n > 1: there the rate of h is no question of the input.
+    /// The shortest deadline in s for which bounded inputs can follow the tube of a start with h₀ = `anchor`,
+    /// from every state in it. `authority` is the minimum, over these states, of the largest ḣ within the
+    /// bounds, in `[h]`/s. `None` for n > 1, where the input does not determine the rate of h.
     ///
-    /// The constraint is hardest on the edge of the tube, where it reads ḣ ≥ −ṡ. The largest −ṡ is k s₀/T at the start.
-    /// So T = k s₀/`authority`, infinite where there is no authority. The source has one condition on the rate of the
-    /// schedule, and a least time in closed form that follows from it. We know both from its abstract only, and derive
-    /// them here from its constraint.
+    /// The constraint is hardest on the edge of the tube, where it reads ḣ ≥ −ṡ. The largest −ṡ is k s₀/T, at
+    /// the start. So T = k s₀/`authority`, infinite without authority. The source has one condition on the
+    /// rate of the schedule, and a least time in closed form that follows from it. We know both only from its
+    /// abstract, and derive them here from its constraint.
     pub fn least_deadline(&self, anchor: f64, authority: f64) -> Option<f64> {
         let width = (-anchor).max(0.0);
         match self.n {
@@ -117,7 +118,8 @@ mod tests {
         assert_eq!(tube.width(&[1.0], 2.0), 0.0);
     }
 
-    /// ẋ = u with |u| ≤ 2 from h₀ = −4: two seconds at full speed along a straight tube, four along the square of it.
+    /// ẋ = u with |u| ≤ 2 from h₀ = −4: two seconds at full speed along a linear tube, four along a quadratic
+    /// one.
     #[test]
     fn the_least_deadline_is_that_of_full_speed() {
         let least = |n, power, anchor, authority| {
@@ -128,12 +130,12 @@ mod tests {
         assert_eq!(least(1, 1, 1.0, 2.0), Some(0.0));
         assert_eq!(least(1, 1, -1.0, 0.0), Some(f64::INFINITY));
         assert_eq!(least(2, 2, -4.0, 2.0), None);
-        // At that deadline the floor at the start is what the bounds allow.
+        // At that deadline, the floor at the start is the largest rate within the bounds.
         let tube = Tube::new(1, 1, 2.0).expect("valid");
         assert_eq!(tube.bound(&Sample::new(&[-4.0], 2.0, 0.0, &[-4.0])).floor, 2.0);
     }
 
-    /// From rest the tube of order 2 is wider than |h₀|, by just what makes (D + a)(h + s) = 0 there.
+    /// From rest, the tube of order 2 is wider than |h₀|, exactly so that (D + a)(h + s) = 0 there.
     #[test]
     fn the_start_is_in_the_tube_with_its_derivatives() {
         let tube = Tube::new(2, 2, 3.0).expect("valid");

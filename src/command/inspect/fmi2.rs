@@ -17,7 +17,7 @@ pub(super) struct Capabilities {
     needs_execution_tool: bool,
 }
 
-/// What model exchange can do.
+/// The capabilities of model exchange.
 #[derive(Serialize)]
 pub(super) struct Exchange<'a> {
     model_identifier: &'a str,
@@ -43,7 +43,7 @@ impl<'a> Exchange<'a> {
     }
 }
 
-/// The names of the states that model exchange has, in the order of its functions.
+/// The names of the states for model exchange, in the order of its functions.
 fn states(d: &Description) -> Vec<&str> {
     let state = |unknown: &Unknown| Some(d.at(d.at(unknown.index)?.state()?)?.name.as_str());
     d.derivatives.iter().filter_map(state).collect()
@@ -134,7 +134,7 @@ pub(super) fn facts(d: &Description) -> Facts {
     ]);
     facts.push(("interfaces", "model exchange, co-simulation".to_owned()));
     facts.push(("states", states(d).join(", ")));
-    // Each interface has a line of its own.
+    // Each interface has its own line.
     for (can, interface) in [(exchanged, "model exchange"), (capabilities, "co-simulation")] {
         facts.extend((!can.is_empty()).then(|| ("can", format!("{can} (in {interface})"))));
     }

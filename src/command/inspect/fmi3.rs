@@ -1,4 +1,4 @@
-//! The report on an FMU of FMI 3.0, of any interface.
+//! The report on an FMU of FMI 3.0 with any interface.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -29,7 +29,7 @@ pub(super) struct Interface<'a> {
     own: Own,
 }
 
-/// What only one interface has.
+/// Attributes that only one interface has.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Own {
@@ -55,7 +55,7 @@ enum Own {
 #[derive(Serialize)]
 pub(super) struct Terminal<'a> {
     name: &'a str,
-    /// The name of the terminal that it lies in.
+    /// The name of the parent terminal.
     inside: Option<&'a str>,
     matching_rule: &'a str,
     /// Names in the terminal, each with its variable.
@@ -100,14 +100,15 @@ impl fmt::Display for Size<'_> {
     }
 }
 
-/// The terminals of the archive; none if there is no such file or it cannot be read, which `punctual validate` tells.
+/// The terminals of the archive; none if there is no such file or it cannot be read, which `punctual
+/// validate` reports.
 pub(super) fn terminals(archive: &Archive) -> Terminals {
     let text = archive.xml(TERMINALS).ok();
     let read = |text: &String| Some(LocatedTerminals::read(&Document::parse(text).ok()?).terminals);
     text.as_ref().and_then(read).unwrap_or_default()
 }
 
-/// The errors of the description by the rules beyond the schema.
+/// The errors in the description by the rules beyond the schema.
 pub(super) fn problems(located: &Located) -> Vec<String> {
     let mut problems = Vec::new();
     located.check(&mut |violation| {
@@ -266,7 +267,7 @@ pub(super) fn facts(d: &ModelDescription, version: &str, report: &Report<'_>) ->
     let kinds: Vec<_> = d.interfaces().into_iter().map(|(kind, _)| words(kind)).collect();
     facts.push(("interfaces", kinds.join(", ")));
     facts.push(("states", report.states.as_deref().unwrap_or_default().join(", ")));
-    // Each interface has a line of its own where they differ.
+    // Interfaces that differ have a line each.
     let can = d.interfaces().into_iter().map(|(kind, of)| (words(kind), capabilities(d, kind, of)));
     for (kind, can) in can.filter(|(_, can)| !can.is_empty()) {
         facts.push(("can", format!("{can} (in {kind})")));
@@ -274,7 +275,7 @@ pub(super) fn facts(d: &ModelDescription, version: &str, report: &Report<'_>) ->
     facts
 }
 
-/// The name of an interface for a human.
+/// The name of an interface for the reader.
 fn words(kind: &str) -> &'static str {
     match kind {
         "ModelExchange" => "model exchange",

@@ -9,17 +9,17 @@ use crate::cases::{CENTRE, DEADLINE, Nominal, RADIUS, STEP, Setup, Shape, Vehicl
 const HINDERED_STEP: f64 = 0.01;
 /// End of their runs, in s.
 const HINDERED_END: f64 = 15.0;
-/// Centre of the rock, in m: between start and disc.
+/// Centre of the rock in m, between start and disc.
 const ROCK: [f64; 2] = [22.0, 24.0];
 /// Its radius, in m.
 const ROCK_RADIUS: f64 = 5.0;
 
-/// A vehicle with a method in its setting, from rest in the origin.
+/// A vehicle with a method and settings, starting from rest at the origin.
 #[derive(Clone, Copy, Debug)]
 pub struct Case {
     /// The plant.
     pub vehicle: Vehicle,
-    /// The method by which the deadline is to be met.
+    /// The method that is to meet the deadline.
     pub baseline: Baseline,
     /// Barrier, nominal controller, margin and times.
     pub setup: Setup,
@@ -49,8 +49,8 @@ impl Case {
         [paper, ours]
     }
 
-    /// `vehicle` as it would be used: it moves the wrong way, its inputs have bounds, a rock is in its way, and u_ref only drives
-    /// on. With bounds on all inputs the filter follows plans.
+    /// `vehicle` in realistic use: it starts in the wrong direction, its inputs are bounded, a rock is in its
+    /// way, and u_ref only drives on. With bounds on all inputs, the filter follows backup plans.
     pub fn hindered(vehicle: Vehicle) -> Self {
         let setup =
             Setup { step: HINDERED_STEP, end: HINDERED_END, ..Setup::advised(DEADLINE, HINDERED_STEP) };
@@ -58,7 +58,7 @@ impl Case {
         Self { setup, method: "plans", title: "plans, bounded, past a rock", ..ours }
     }
 
-    /// The file of a hindered vehicle, which has its plant, its start and its u_ref too.
+    /// The file of a hindered vehicle, which also contains its plant, its start and its u_ref.
     pub(super) fn alone(&self) -> String {
         let (title, key) = (self.vehicle.title(), self.vehicle.key());
         let [first, second] = [0, 1].map(|i| self.vehicle.inputs()[i].name);
@@ -106,17 +106,17 @@ radius = {ROCK_RADIUS:?} # m
         self.baseline == Baseline::RepeatedRoot
     }
 
-    /// The plant's files, without ending.
+    /// The plant's file name without extension.
     pub(super) fn plant_stem(&self) -> String {
         format!("{}-plant", self.vehicle.key())
     }
 
-    /// The filter's files, without ending.
+    /// The filter's file name without extension.
     pub(super) fn filter_stem(&self) -> String {
         format!("{}-filter", self.stem())
     }
 
-    /// The coupled run's files, without ending.
+    /// The file name of the coupled run without extension.
     pub(super) fn stem(&self) -> String {
         format!("{}-{}", self.vehicle.key(), self.method)
     }
@@ -178,7 +178,7 @@ step_size = {step:?} # s
         )
     }
 
-    /// The system file that couples the two; their FMUs lie beside it.
+    /// The system file that couples the two; their FMUs are in the same folder.
     pub(super) fn system(&self) -> String {
         let (vehicle, title) = (self.vehicle.title(), self.title);
         let (filter, plant) = (self.filter_stem(), self.plant_stem());

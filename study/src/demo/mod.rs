@@ -1,5 +1,5 @@
-//! The demonstration: three vehicles, the paper's method and ours, each filter and plant an FMU, coupled through FMI. Then the
-//! same vehicles with bounds on their inputs, past a rock, each from one file.
+//! The demonstration: three vehicles, the paper's method and ours, with each filter and plant an FMU, coupled
+//! through FMI. Then the same vehicles with bounds on their inputs, past a rock, each in one file.
 
 mod case;
 mod pictures;
@@ -27,7 +27,7 @@ pub struct Run {
     pub case: Case,
     /// Its recording.
     pub recording: Recording,
-    /// What became of its promises.
+    /// The verdicts on its promises.
     pub promises: Vec<Promise>,
     /// The numbers of the table.
     pub summary: Summary,
@@ -40,8 +40,9 @@ impl Run {
     }
 }
 
-/// Runs all cases, for each vehicle the paper's method, ours, and ours as it would be used. Writes configurations, FMUs,
-/// system files, CSV, pictures and pages into `folder`. `progress` hears of the fraction done (0 to 1).
+/// Runs all cases: for each vehicle the paper's method, ours, and ours in realistic use. Writes
+/// configurations, FMUs, system files, CSV, pictures and pages to `folder`. `progress` gets the fraction done
+/// (0 to 1).
 ///
 /// # Errors
 ///
@@ -68,7 +69,7 @@ pub fn run(
     Ok(runs)
 }
 
-/// Builds the filter of `case` and runs it with the plant, which is in `folder` already.
+/// Builds the filter of `case` and runs it with the plant, which is already in `folder`.
 fn couple(
     case: Case,
     folder: &Path,

@@ -50,7 +50,7 @@ fn paths(vehicle: Vehicle, paper: &Run, ours: &Run) -> Result<PathPlot, Error> {
     })
 }
 
-/// h of each method with the bound it promises, then both as distances near the deadline.
+/// h of each method with its promised bound, then both as distances near the deadline.
 fn barriers(paper: &Run, ours: &Run) -> Result<Vec<TimePlot>, Error> {
     let mut plots = Vec::new();
     // h with its bound, a panel for each method.
@@ -102,10 +102,11 @@ fn barriers(paper: &Run, ours: &Run) -> Result<Vec<TimePlot>, Error> {
     Ok(plots)
 }
 
-/// The two inputs of a run, one panel each: their units differ.
+/// The two inputs of a run, one panel each, since their units differ.
 fn inputs(run: &Run) -> Result<Vec<TimePlot>, Error> {
     let time = run.recording.times();
-    // The paper's inputs go from rest to tens of thousands: only a logarithm shows more than the last sample.
+    // The paper's inputs range from rest to tens of thousands, so a linear axis would only show the last
+    // sample.
     let logarithmic = run.case.is_the_papers();
     let mut plots = Vec::new();
     for (i, signal) in run.case.vehicle.inputs().iter().enumerate() {
@@ -114,7 +115,7 @@ fn inputs(run: &Run) -> Result<Vec<TimePlot>, Error> {
         for (label, variable, style, colour) in
             [("safe input u", "u", Style::Steps, 0), ("nominal input", "u_ref", Style::Dashed, 1)]
         {
-            // An unconnected reference is not recorded: it stays 0.
+            // An unconnected reference is not recorded, since it stays 0.
             let Some(values) = run.recording.series(&format!("filter.{variable}.{name}")) else {
                 continue;
             };

@@ -14,15 +14,15 @@ pub struct Summary {
     pub arrival: Option<f64>,
     /// Smallest h from the deadline on, in the unit of h.
     pub min_h_after_deadline: f64,
-    /// Largest distance from the disc from the deadline on, in m; 0: never outside.
+    /// Largest distance from the disc from the deadline on, in m; 0 if it was never outside.
     pub farthest_outside: f64,
-    /// Largest size of each input before the arrival (in the whole run if there is none), in its unit.
+    /// Largest magnitude of each input before the arrival (in the whole run if there is none), in its unit.
     pub peak_to_arrival: [f64; 2],
-    /// Largest length of the input vector before the arrival; for the point mass, in m/s².
+    /// Largest norm of the input vector before the arrival; for the point mass, in m/s².
     pub peak_norm_to_arrival: f64,
-    /// Largest size of each input in the whole run, in its unit.
+    /// Largest magnitude of each input in the whole run, in its unit.
     pub peak: [f64; 2],
-    /// Largest length of the input vector in the whole run; for the point mass, in m/s².
+    /// Largest norm of the input vector in the whole run; for the point mass, in m/s².
     pub peak_norm: f64,
     /// Samples whose constraint was not met.
     pub unsatisfied: usize,

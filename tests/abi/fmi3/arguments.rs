@@ -1,4 +1,4 @@
-//! NULL, counts and value references of arrays; that a failed call changes nothing.
+//! NULL, counts and value references of arrays; and a failed call changes nothing.
 
 use std::ptr::{null, null_mut};
 
@@ -62,7 +62,7 @@ fn value_references_that_are_none() {
     assert!(message.contains("is x of type Float64, not UInt8"), "{message}");
     let message = slave.refused((API.get_string)(c, null(), 0, null_mut(), 1));
     assert!(message.contains("values is NULL") || message.contains("nValues is 1, must be 0"), "{message}");
-    // What cannot be set.
+    // Variables that cannot be set.
     let set = |name: &str, values: &[f64]| slave.refused(slave.set(name, values));
     assert_eq!(set("u", &[0.0; 2]), "fmi3SetFloat64: u is of causality output and cannot be set");
     assert_eq!(set("time", &[0.0]), "fmi3SetFloat64: time is of causality independent and cannot be set");
@@ -77,7 +77,7 @@ fn value_references_that_are_none() {
     assert!(message.contains("status is of causality output"), "{message}");
 }
 
-/// One element outside its range refuses all of them, and the others too.
+/// One element outside its range makes the call refuse all values, including those of other variables.
 #[test]
 fn a_parameter_keeps_to_its_range_by_elements() {
     let fmu = Fmu::of_fmi3(FILTER, true);
@@ -104,7 +104,7 @@ fn null_arrays() {
     assert!(slave.refused((API.get_float64)(c, &raw const u, 1, null_mut(), 2)).contains("NULL"));
     assert!(slave.refused((API.set_float64)(c, &raw const u, 1, null(), 2)).contains("NULL"));
     assert!(slave.refused((API.set_float64)(c, &raw const u, usize::MAX, &1.0, 1)).contains("cannot have"));
-    // A step writes four things, so each has to be there, and is looked for before the step.
+    // A step writes four values, so each pointer must be valid; this is checked before the step.
     let (mut flag, mut last) = (7, 0.5);
     let (f, l) = (&raw mut flag, &raw mut last);
     for (event, end, early, last) in

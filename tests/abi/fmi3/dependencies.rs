@@ -1,11 +1,11 @@
-//! What each element of an output depends on.
+//! The dependencies of each element of an output.
 
 use super::slave::Slave;
 use crate::api::three::API;
 use crate::fmu::{FILTER, Fmu, PLANT};
 use punctual_fmu::fmi3::DEPENDENT;
 
-/// Element of the output, name and element of what it depends on.
+/// For each dependency: the element of the output, and the name and element of the variable it depends on.
 fn dependencies(slave: &Slave, name: &str) -> Vec<(usize, String, usize)> {
     let (c, reference, mut n) = (slave.instance, slave.fmu.item(name).reference(), 0);
     slave.ok((API.get_number_of_variable_dependencies)(c, reference, &raw mut n));
@@ -32,7 +32,7 @@ fn of_each_element() {
     let controller = "kind = \"controller\"\nplant.model = \"point_mass\"\ncontroller = \"damping\"\n";
     let fmu = Fmu::of_fmi3(controller, true);
     let slave = Slave::ready(&fmu);
-    // Each input damps the velocity along it: the states are (x_p, y_p, v_x, v_y).
+    // Each input damps the velocity in its direction: the states are (x_p, y_p, v_x, v_y).
     assert_eq!(dependencies(&slave, "u_ref"), [(1, "x".to_owned(), 3), (2, "x".to_owned(), 4)]);
 
     let fmu = Fmu::of_fmi3(PLANT, true);

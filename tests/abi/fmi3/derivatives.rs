@@ -1,4 +1,4 @@
-//! Directional and adjoint derivatives against each other, against those of FMI 2.0 and against differences.
+//! Directional and adjoint derivatives compared with each other, with those of FMI 2.0 and with differences.
 
 use std::ffi::c_int;
 use std::ptr::null_mut;
@@ -60,7 +60,8 @@ fn read(slave: &Slave, (references, elements): &(Vec<u32>, usize)) -> Vec<f64> {
     values
 }
 
-/// Compares all elements; returns whether the row of a barrier changed the input, so that something is active.
+/// Compares all elements; returns whether the row of a barrier changed the input, so that some constraint is
+/// active.
 fn compare(slave: &Slave, values: &[f64], when: &str) {
     let inputs = numbers(slave.fmu, Causality::Input);
     let outputs = numbers(slave.fmu, Causality::Output);
@@ -70,10 +71,10 @@ fn compare(slave: &Slave, values: &[f64], when: &str) {
         slave.ok((API.set_float64)(slave.instance, r, n, values.as_ptr(), values.len()));
     };
     set(values);
-    // Outputs are computed when they are read; from then on they are known.
+    // Outputs are computed when they are read; then they are known.
     read(slave, &outputs);
     let before = slave.now();
-    // The Jacobian by directional derivatives, a column for each element of the inputs.
+    // The Jacobian from directional derivatives, one column for each element of the inputs.
     let columns: Vec<Vec<f64>> = (0..inputs.1)
         .map(|k| {
             let mut seed = vec![0.0; inputs.1];
@@ -83,7 +84,7 @@ fn compare(slave: &Slave, values: &[f64], when: &str) {
             column
         })
         .collect();
-    // Its rows by adjoint derivatives: the same numbers, since one is made of the other.
+    // Its rows from adjoint derivatives: the same numbers, since one is computed from the other.
     for i in 0..outputs.1 {
         let mut seed = vec![0.0; outputs.1];
         seed[i] = 1.0;
@@ -186,7 +187,7 @@ fn wrong_lengths_and_wrong_variables() {
     assert!(slave.refused(status).contains("NULL"));
 }
 
-/// Where a derivative is no number the run may go on: discarded, not an error.
+/// If a derivative is not finite, the run may continue: discarded, not an error.
 #[test]
 fn no_finite_derivative() {
     let heading =

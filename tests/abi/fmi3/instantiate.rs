@@ -36,7 +36,7 @@ fn what_is_not_offered_is_refused_in_plain_words() {
     assert!(message.contains("\"{other}\", must be") && message.contains(fmu.guid()), "{message}");
     let message = refusal(&Said { path: Some(c"/nowhere/resources".to_owned()), ..good.clone() });
     assert!(message.contains("cannot read /nowhere/resources/configuration.toml"), "{message}");
-    // An early return is only allowed, so nobody is refused for it.
+    // An early return is only permitted, so it is no reason for refusal.
     let log = Log::default();
     let instance = Said { early: true, ..good }.instantiate(&log);
     assert!(!instance.is_null(), "{:?}", log.entries());
@@ -82,7 +82,7 @@ fn the_other_interfaces_are_refused() {
     assert_eq!(to.failure(), "fmi3InstantiateScheduledExecution: the FMU has no scheduled execution");
 }
 
-/// A function of the other version is refused, and the instance goes on.
+/// A function of the other version is refused, and the instance continues.
 #[test]
 fn functions_of_the_other_version() {
     let (two, three) = (Fmu::new(FILTER), Fmu::of_fmi3(FILTER, true));
@@ -100,7 +100,7 @@ fn functions_of_the_other_version() {
     );
     old.step(0.0, 0.1);
     new.step(0.0, 0.1);
-    // And a version makes no instance of the other's FMU.
+    // A version also does not instantiate an FMU of the other version.
     let message = refusal(&Said::of(&two));
     let wanted = "the FMU is one of FMI 2.0, which has no instance of FMI 3.0";
     assert_eq!(message, format!("fmi3InstantiateCoSimulation: {wanted}"));
@@ -115,7 +115,7 @@ fn functions_of_the_other_version() {
     assert_ne!(two.guid(), three.guid(), "a token of its own");
 }
 
-/// FMI 3.0 allows only what was asked for, but for errors.
+/// FMI 3.0 only allows messages that were requested, apart from errors.
 #[test]
 fn a_log_that_nobody_wants_has_errors_only() {
     let fmu = Fmu::of_fmi3(FILTER, true);

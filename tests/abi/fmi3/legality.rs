@@ -11,11 +11,11 @@ use crate::api::three::API;
 use crate::api::{ERROR, OK};
 use crate::fmu::{FILTER, Fmu, PLANT};
 
-/// A function, its call in the table (`None`: legal in every mode), and its answer where legal: OK, or an error since
-/// the description excludes it.
+/// A function, its call in the table (`None`: legal in every mode), and its answer if it is legal: OK, or an
+/// error because the description excludes it.
 type Function = (&'static str, Option<Call>, fn(&Slave) -> c_int, c_int);
 
-/// Reads and writes of no value at all, which every mode that allows the call allows.
+/// Reads and writes of zero values, which succeed in every mode that allows the call.
 macro_rules! nothing {
     ($($symbol:literal $field:ident $call:ident;)*) => {
         [$(($symbol, Some(Call::$call), (|s| (API.$field)(s.instance, null(), 0, null_mut(), 0)) as fn(&Slave) -> c_int, OK)),*]
@@ -56,7 +56,7 @@ const WRITTEN: [Function; 12] = nothing! {
     "fmi3SetFloat64" set_float64 Set;
 };
 
-/// The other functions with arguments that are right for either FMU in every mode that allows them.
+/// The other functions, with arguments that are valid for both FMUs in every mode that allows them.
 const OTHERS: [Function; 46] = [
     ("fmi3SetDebugLogging", None, |s| (API.set_debug_logging)(s.instance, 1, 0, null()), OK),
     (
@@ -226,7 +226,7 @@ const OTHERS: [Function; 46] = [
     ),
 ];
 
-/// The functions that no instance of co-simulation is needed for, or that free it.
+/// The functions that need no co-simulation instance, or that free it.
 const WITHOUT: [&str; 5] = [
     "fmi3GetVersion",
     "fmi3InstantiateModelExchange",
@@ -251,7 +251,8 @@ fn into_mode(fmu: &Fmu, mode: Mode) -> Slave<'_> {
     slave
 }
 
-/// Goes on from `mode` by the calls that only this mode allows, to a step; returns all that was seen there.
+/// Continues from `mode` with the calls that only this mode allows, up to a step; returns everything
+/// observed.
 fn finish(slave: &Slave, mode: Mode) -> Vec<String> {
     let c = slave.instance;
     if mode == Mode::TERMINATED {
@@ -308,7 +309,7 @@ fn null_is_an_error_everywhere() {
     let fmu = Fmu::of_fmi3(PLANT, true);
     let mut slave = Slave::ready(&fmu);
     let instance = std::mem::replace(&mut slave.instance, null_mut());
-    // States need an instance to be made.
+    // Creating a state requires an instance.
     let needs_one = |name: &&str| name.contains("FMUState") && !name.contains("Get");
     for (name, _, function, _) in READ.iter().chain(&WRITTEN).chain(&OTHERS) {
         if !needs_one(name) {

@@ -1,4 +1,4 @@
-//! The functions of FMI 3.0, each through `dlopen`, and the same FMU under 2.0 beside.
+//! The functions of FMI 3.0, each through `dlopen`, compared with the same FMU under 2.0.
 //!
 //! | module | asks |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! Whole runs have the bits of FMI 2.0, by arrays and by scalars.
+//! Whole runs are bitwise those of FMI 2.0, with arrays and with scalars.
 
 use super::slave::Slave;
 use crate::api::three::API;
@@ -7,7 +7,7 @@ use crate::fmu::{EXTERNAL, FILTER, Fmu, PLANT, STEERED};
 
 const CONTROLLER: &str = "kind = \"controller\"\nplant.model = \"unicycle\"\ncontroller = \"waypoints\"\n\
                           points = [[1.0, 2.0], [3.0, 4.0]]\nacceptance_radius = 0.5\n";
-/// Inputs that wander, each step others.
+/// Inputs that change at each step.
 fn inputs(count: usize, k: usize) -> Vec<f64> {
     (0..count).map(|i| 20.0 * f64::sin(0.05 * k as f64 + i as f64) + 0.1 * i as f64).collect()
 }
@@ -43,7 +43,7 @@ fn whole_runs_are_equal_bit_for_bit() {
                     old.set_flag("rearm", true);
                     new.set_flag("rearm", true);
                 }
-                // An output is read before the step, and after it.
+                // Outputs are compared before the step and after it.
                 assert_eq!(new.snapshot(), old.snapshot(), "before step {k} of {configuration}");
                 old.step(t, 0.05);
                 new.step(t, 0.05);
@@ -55,7 +55,7 @@ fn whole_runs_are_equal_bit_for_bit() {
     }
 }
 
-/// The names of arrays, as docs/fmu.md has them.
+/// The names of the arrays are those in docs/fmu.md.
 #[test]
 fn what_belongs_together_is_one_array() {
     let names = |configuration: &str, arrays| -> Vec<String> {

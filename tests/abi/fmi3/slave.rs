@@ -42,7 +42,7 @@ pub(crate) unsafe extern "C" fn log(environment: *mut c_void, status: Status, ca
     log.0.lock().unwrap().push((status.0, category, message));
 }
 
-/// An instance; freed when dropped, in whatever mode it is.
+/// An instance; freed when dropped, in any mode.
 pub(crate) struct Slave<'a> {
     pub(crate) instance: Instance,
     pub(crate) log: Box<Log>,
@@ -55,7 +55,7 @@ impl Drop for Slave<'_> {
     }
 }
 
-/// What an importer says when it instantiates.
+/// The arguments with which an importer instantiates.
 #[derive(Clone)]
 pub(crate) struct Said {
     pub(crate) token: Option<CString>,
@@ -149,7 +149,7 @@ impl<'a> Slave<'a> {
         self.ok((API.set_boolean)(self.instance, &raw const reference, 1, &raw const value, 1));
     }
 
-    /// Sets the first scalars, which are the inputs, by the variables that hold them.
+    /// Sets the first scalars, which are the inputs, through the variables that contain them.
     pub(crate) fn set_inputs(&self, values: &[f64]) {
         let items = self.fmu.product.items.iter().take_while(|item| item.scalars.end <= values.len());
         let references: Vec<u32> = items.map(Item::reference).collect();
@@ -173,7 +173,7 @@ impl<'a> Slave<'a> {
         self.ok(self.try_step(t, h));
     }
 
-    /// A new state; the instance frees it at the latest.
+    /// A new state, which the instance frees if nothing else does.
     pub(crate) fn state(&self) -> State {
         let mut state = null_mut();
         self.ok((API.get_state)(self.instance, &raw mut state));
@@ -190,7 +190,7 @@ impl<'a> Slave<'a> {
         bytes
     }
 
-    /// The present state as bytes: every bit that the instance remembers.
+    /// The current state as bytes: everything that the instance remembers.
     pub(crate) fn now(&self) -> Vec<u8> {
         let mut state = self.state();
         let bytes = self.bytes(state);

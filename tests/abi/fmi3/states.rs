@@ -1,4 +1,4 @@
-//! Snapshots: back and on again, as bytes, and those that are refused.
+//! Snapshots: restored and continued, serialised, and refused.
 
 use std::ptr::null_mut;
 
@@ -14,7 +14,7 @@ fn steps(slave: &Slave, from: usize, count: usize) -> Vec<String> {
     slave.snapshot()
 }
 
-/// `PLANT` has two inputs; of `FILTER` they are the first two of an array.
+/// `PLANT` has two inputs; those of `FILTER` are the first two elements of an array.
 fn fmus() -> [Fmu; 3] {
     [Fmu::of_fmi3(PLANT, true), Fmu::of_fmi3(PLANT, false), Fmu::of_fmi3(FILTER, false)]
 }
@@ -29,7 +29,7 @@ fn back_and_on_again_gives_the_same_bits() {
         let wanted = steps(&slave, 3, 5);
         slave.ok((API.set_state)(slave.instance, state));
         assert_eq!(steps(&slave, 3, 5), wanted);
-        // Into a new instance, which takes the mode over.
+        // Into a new instance, which also takes over the mode.
         let other = Slave::new(fmu);
         let mut read = null_mut();
         other.ok((API.deserialize_state)(other.instance, bytes.as_ptr(), bytes.len(), &raw mut read));
@@ -66,7 +66,7 @@ fn damaged_bytes_and_those_of_another_fmu_are_refused() {
     assert!(read.is_null());
 }
 
-/// The stop time belongs to the state: past it no step is made (FMI 3.0.2, section 2.3.2).
+/// The stop time is part of the state: no step goes beyond it (FMI 3.0.2, section 2.3.2).
 #[test]
 fn no_step_goes_past_the_stop_time() {
     let fmu = Fmu::of_fmi3(PLANT, true);
@@ -85,7 +85,7 @@ fn no_step_goes_past_the_stop_time() {
     other.ok((API.reset)(other.instance));
     other.initialize();
     other.step(0.0, 5.0);
-    // A stop that is none.
+    // A missing stop time.
     other.ok((API.reset)(other.instance));
     let message = other.refused((API.enter_initialization_mode)(other.instance, 0, 0.0, 2.0, 1, 1.0));
     assert_eq!(message, "fmi3EnterInitializationMode: stopTime is 1, must be >= startTime = 2");

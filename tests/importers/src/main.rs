@@ -1,5 +1,5 @@
-//! Two importers that are not ours, `fmi` and `fmi-rs`, couple a filter with a plant, by FMI 2.0 and 3.0. Every output of
-//! both must equal that recorded by `punctual run`, bit for bit, at every communication point.
+//! Two independent importers, `fmi` and `fmi-rs`, couple a filter with a plant, with FMI 2.0 and 3.0. Every
+//! output of both must equal that recorded by `punctual run`, bit for bit, at every communication point.
 //!
 //! `punctual-importers FOLDER STEP`, where FOLDER holds recorded.csv, filter.fmu and plant.fmu, and the same for FMI 3.0
 //! in its folder fmi3; see `run`.
@@ -16,7 +16,7 @@ use std::path::Path;
 
 use recording::Recording;
 
-/// Getters by which a value is read.
+/// The getters by which values are read.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Real,
@@ -25,7 +25,7 @@ enum Kind {
     Boolean,
 }
 
-/// A variable as the importer's own reader found it.
+/// A variable as the importer's own reader sees it.
 struct Variable {
     name: String,
     reference: u32,
@@ -86,7 +86,7 @@ fn compare<I: Importer>(folder: &Path, h: f64, recording: &Recording) -> usize {
     let mut compared = 0;
     let mut check = |row: usize, component: &str, values: Vec<(String, f64)>| {
         for (name, value) in values {
-            // An Integer twin has the number of the enumeration, which alone is recorded.
+            // An Integer twin has the number of the enumeration; only the enumeration is recorded.
             let recorded = name.strip_suffix("_code").unwrap_or(&name);
             let wanted = recording.value(row, &format!("{component}.{recorded}"));
             assert_eq!(

@@ -1,8 +1,9 @@
-//! The crate `fmi` (rust-fmi), by FMI 3.0.
+//! The crate `fmi` (rust-fmi), with FMI 3.0.
 //!
-//! Its reader (`fmi-schema` 0.8.0) refuses a description with units. In `src/fmi3/variable/mod.rs` a Float64 has no
-//! attributes `unit` and `quantity`, and unknown ones are errors. So it is given the text without them. The archive and
-//! the library stay what they are. The reader also passes over every enumeration. What remains are their Int32 twins.
+//! Its reader (`fmi-schema` 0.8.0) refuses a description with units: in `src/fmi3/variable/mod.rs` a Float64
+//! has no attributes `unit` and `quantity`, and unknown ones are errors. So it is given the text without
+//! them; the archive and the library are unchanged. The reader also skips every enumeration, so that only
+//! their Int32 twins remain.
 
 use std::fs::File;
 use std::path::Path;
@@ -34,9 +35,9 @@ fn without(text: &str, attribute: &str) -> String {
     parts.fold(first, |kept, part| kept + part.split_once('"').expect("the end of a value").1)
 }
 
-/// Opens `file` by a description without units.
+/// Opens `file` with a description without units.
 fn import(file: &Path) -> Fmi3Import {
-    // A release that reads units needs none of this.
+    // Not needed with a release that reads units.
     let refusal = fmi::import::from_path::<Fmi3Import>(file).expect_err("units, which fmi 0.8.0 refuses");
     assert!(format!("{refusal:?}").contains("field: \"quantity\""), "{refusal:?}");
     let folder = tempfile::tempdir().expect("a folder");

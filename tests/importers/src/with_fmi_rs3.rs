@@ -1,4 +1,4 @@
-//! The crate `fmi-rs`, by FMI 3.0.
+//! The crate `fmi-rs`, with FMI 3.0.
 
 use std::collections::HashSet;
 use std::path::Path;
@@ -27,7 +27,7 @@ fn ok(status: fmi3Status) {
 impl Importer for Slave {
     fn open(file: &Path) -> Self {
         let mut builder = FMU3Builder::new(&file).expect("an FMU that fmi-rs reads").loggingOn(true);
-        // It would ask for both, whatever the description says.
+        // By default it would request both, whatever the description says.
         (builder.eventModeUsed, builder.earlyReturnAllowed) = (false, false);
         let mut enumerations = HashSet::new();
         let mut variables = Vec::new();

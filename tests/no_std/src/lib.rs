@@ -1,4 +1,4 @@
-//! Compiles only if nothing below the core takes std: there can be one panic handler.
+//! Compiles only if nothing below the core uses std, since there can be only one panic handler.
 #![no_std]
 #![forbid(unsafe_code)]
 

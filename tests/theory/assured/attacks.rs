@@ -1,4 +1,4 @@
-//! What is accepted is kept: random closed loops, looked at by the judge at all instants.
+//! What is accepted is kept: random closed loops, checked by the judge at all instants.
 
 use punctual_core::filter::AssuranceStatus;
 
@@ -7,8 +7,8 @@ use crate::judge::families::assured;
 use crate::judge::on_every_core;
 use crate::judge::run::run_assured;
 
-/// Vehicles of any kind, starts, deadlines, bounds, obstacles, regular and irregular steps that are told, and five
-/// ways to choose u_ref.
+/// Vehicles of any kind, starts, deadlines, bounds, obstacles, regular and irregular steps announced to the
+/// filter, and five ways to choose u_ref.
 #[test]
 fn table_of_assured_promises() {
     let count = cases(12, 10_000);

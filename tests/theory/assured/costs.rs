@@ -1,4 +1,4 @@
-//! What a step with a backup plan costs: a distribution that is printed, and never asserted.
+//! The cost of a step with a backup plan: a distribution that is printed, but never asserted.
 
 use std::time::Instant;
 
@@ -15,7 +15,7 @@ use crate::obstacles::{GOAL, feasible_starts, filter};
 const STEP: f64 = 0.01;
 const END: f64 = 15.0;
 
-/// Unicycles from random starts, with that way to choose u_ref; T = 10 s without obstacles, 20 s with ten.
+/// Unicycles from random starts, with this choice of u_ref; T = 10 s without obstacles, 20 s with ten.
 fn times(obstacles: bool, steps: usize) -> (Vec<f64>, Vec<f64>, usize, usize) {
     let (mut all, mut first, mut searches, mut samples) = (Vec::new(), Vec::new(), 0, 0);
     let starts = feasible_starts(1000);
@@ -56,7 +56,7 @@ fn times(obstacles: bool, steps: usize) -> (Vec<f64>, Vec<f64>, usize, usize) {
                 first.extend((k == 0).then_some(taken));
                 break;
             }
-            // A search shows as the plan's, by other laws than those before.
+            // A search is recognised by a step that the plan drives with other laws than before.
             if k == 0 || assurance.driver == Driver::Plan {
                 let laws =
                     serde_json::to_value(&filter.state().plan).expect("serialises")["plan"]["reference"]
@@ -76,7 +76,7 @@ fn times(obstacles: bool, steps: usize) -> (Vec<f64>, Vec<f64>, usize, usize) {
     (all, first, searches, samples)
 }
 
-/// Of a million steps each in `tests/nightly`.
+/// A million steps of each in `tests/nightly`.
 #[test]
 fn the_cost_of_a_step() {
     let steps = cases(1000, 1_000_000) as usize;

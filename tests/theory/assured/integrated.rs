@@ -1,5 +1,5 @@
-//! Bicycles whose angle is a state that the filter commands the rate of (docs/bicycle.md, the plant's own model), with
-//! a backup plan.
+//! Bicycles whose angle is a state and whose filter commands its rate (docs/bicycle.md, the plant's own
+//! model), with a backup plan.
 
 use punctual_core::filter::AssuranceStatus;
 use punctual_study::bicycles::Size;
@@ -26,7 +26,7 @@ fn case(size: Size, plant: Plant, start: [f64; 4]) -> Case {
         outside: false,
     };
     let goal = Set { rate: Some(5.0), stay_rate: Some(5.0), margin: 0.02, ..Set::within(goal, DEADLINE) };
-    // tan β is half of tan δ where both axles are as far away.
+    // tan β is half of tan δ if both axles are equally far from the centre of mass.
     let limit =
         if matches!(plant, Plant::Kinematic { .. }) { (2.0 * size.slip.tan()).atan() } else { size.slip };
     let angle = |sign: f64| Set::keeping(Shape::Angle { sign, limit }, DEADLINE);
@@ -35,10 +35,10 @@ fn case(size: Size, plant: Plant, start: [f64; 4]) -> Case {
     Case { sets, bounds: BOUNDS, reference: Reference::Damping(1.0), ..case }
 }
 
-/// Accepted and kept until 2T, of the hundred starts of docs/bicycle.md.
+/// Accepted and kept until 2T, out of the hundred starts of docs/bicycle.md.
 #[test]
 fn table_of_assured_bicycles_with_an_integrator() {
-    /// Part of the starts that has to be accepted; 0.97 is the goal, which the small slip misses.
+    /// Fraction of the starts that must be accepted; 0.97 is the goal, which the small-slip bicycle misses.
     const ACCEPTED: f64 = 0.5;
     let starts = &starts()[..cases(2, 100).min(100) as usize];
     println!("| vehicle | model and plant | starts | accepted | kept | lost | driven by the plan |");

@@ -1,4 +1,5 @@
-//! Through ten obstacles with a backup plan: what is accepted is on time, kept and clear of all, and never infeasible.
+//! Ten obstacles with a backup plan: what is accepted is on time, kept and without collision, and never
+//! infeasible.
 
 use punctual_core::dynamics::{ControlAffine, rk4_step};
 use punctual_core::filter::{Driver, Status};
@@ -10,17 +11,17 @@ use super::cases;
 use crate::judge::on_every_core;
 use crate::obstacles::{DEADLINE, GOAL, Nominal, OBSTACLES, STEP, bicycle, feasible_starts, filter};
 
-/// Parts of a hold at whose ends distances are looked at.
+/// Number of parts of a hold; distances are checked at their ends.
 const PARTS: usize = 5;
 
-/// All starts are asked for, one of so many is driven: the others show no more.
+/// Every start is checked for acceptance, and one in this many is simulated; the others show no more.
 const DRIVEN: u64 = 10;
 
 /// Result of a run.
 #[derive(Clone, Copy, Debug)]
 struct Run {
     start: [f64; 4],
-    /// Number of steps, 0 where it was only asked whether it is accepted.
+    /// Number of steps; 0 if only acceptance was checked.
     steps: usize,
     /// Why it was refused, if it was.
     refused: Option<Failure>,
@@ -30,12 +31,12 @@ struct Run {
     /// Whether it was inside from the deadline until the end of the run.
     kept: bool,
     infeasible: usize,
-    /// Steps that the plan drove, and steps that were not assured.
+    /// Steps driven by the plan, and steps that were not assured.
     driven: usize,
     unsaid: usize,
 }
 
-/// Runs from `start` until half as long again as the deadline, if it is accepted and to be driven.
+/// Runs from `start` until 1.5 times the deadline, if it is accepted and to be simulated.
 fn run<P>(plant: &P, bounds: [f64; 2], nominal: Nominal, start: [f64; 4], driven: bool) -> Run
 where
     P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
@@ -79,7 +80,8 @@ where
             }
             let inside = (x[0] - GOAL.0[0]).hypot(x[1] - GOAL.0[1]) <= GOAL.1;
             run.on_time |= inside && now <= DEADLINE;
-            // A part of a step late, so that round-off in t asks for nothing before the deadline.
+            // A fraction of a step late, so that round-off in t does not require anything before the
+            // deadline.
             run.kept &= inside || now < DEADLINE + 1e-6 * STEP;
             x = rk4_step(plant, &x, &u, STEP / PARTS as f64);
         }
@@ -121,7 +123,7 @@ fn row(name: &str, runs: &[Run]) {
 /// The same starts, bounds and obstacles as without plans.
 #[test]
 fn table_of_assured_ways_through_obstacles() {
-    /// Part of the starts that has to be accepted.
+    /// Fraction of the starts that must be accepted.
     const ACCEPTED: f64 = 0.99;
     let starts = feasible_starts(cases(2, 1000) as usize);
     println!(

@@ -1,5 +1,5 @@
-//! Unicycles and bicycles with bounds, for a judge outside: `tests/oracle/optimise.py` asks an optimiser with many
-//! starts whether what is refused here can be done.
+//! Unicycles and bicycles with bounds, for an independent judge: `tests/oracle/optimise.py` uses an optimiser
+//! with many initial guesses to find out whether a refused case is feasible.
 
 use std::f64::consts::PI;
 use std::fs;
@@ -14,10 +14,11 @@ use crate::judge::on_every_core;
 
 /// Radius of the goal, around the origin, in m.
 const RADIUS: f64 = 2.0;
-/// Holds of the optimiser until the deadline. Each is a number of periods, so that what it finds is a plan.
+/// Number of holds until the deadline for the optimiser. Each is a whole number of periods, so that a
+/// solution is a plan.
 const HOLDS: usize = 40;
 
-/// A start outside, and a deadline around the least time that a unicycle needs to turn, drive and stop.
+/// A start outside, and a deadline close to the least time that a unicycle needs to turn, drive and stop.
 fn draw(seed: u64, bicycle: bool) -> Case {
     let mut numbers = Numbers::new(seed);
     let a = numbers.scale(0.5, 10.0);
@@ -26,7 +27,7 @@ fn draw(seed: u64, bicycle: bool) -> Case {
     let speed = numbers.within(-1.0, 1.0) * (a * far).sqrt();
     let start = [far * angle.cos(), far * angle.sin(), heading, speed];
     let (plant, turning) = match bicycle {
-        // Circles from a tenth of the way on.
+        // Turning circles of a tenth of the distance or more.
         true => (Plant::Bicycle { l_r: far * numbers.scale(0.05, 0.5) }, numbers.within(0.3, 1.2)),
         false => (Plant::Unicycle, numbers.scale(0.3, 4.0)),
     };
@@ -44,8 +45,8 @@ fn draw(seed: u64, bicycle: bool) -> Case {
     Case { bounds: [a, turning], ..case }
 }
 
-/// The time in s in which a unicycle stops, turns towards the origin or away from it, drives there and stops, inputs
-/// at their bounds: what can be done for certain.
+/// The time in s in which a unicycle stops, turns towards the origin or away from it, drives there and stops,
+/// with inputs at their bounds. This is certainly feasible.
 fn turn_and_drive(start: &[f64; 4], [a, turning]: [f64; 2]) -> f64 {
     let [x, y, heading, v] = *start;
     let stopped = v.abs() * v / (2.0 * a);
@@ -62,11 +63,11 @@ fn described(case: &Case, accepted: bool) -> Value {
     })
 }
 
-/// Every unicycle that has the time to stop, turn, drive and stop is accepted. With `PUNCTUAL_ORACLE` all cases are
-/// written to that file.
+/// Every unicycle that has time to stop, turn, drive and stop is accepted. With `PUNCTUAL_ORACLE`, all cases
+/// are written to that file.
 #[test]
 fn table_of_what_a_manoeuvre_can_do() {
-    /// Holds change at samples only: so many periods more, one for each of the four changes.
+    /// Inputs change only at samples: up to one additional period for each of the four changes.
     const CHANGES: f64 = 4.0;
     let count = cases(24, 400);
     let found = on_every_core(count, |i| {

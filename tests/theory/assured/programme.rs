@@ -1,10 +1,10 @@
-//! The point mass against an exact convex programme: of the starts from which held inputs within the bounds can keep
-//! deadline and stay, how many a plan is found from.
+//! The point mass compared with an exact convex programme: from how many of the starts that are feasible with
+//! held inputs within the bounds a plan is found.
 //!
-//! The programme has the input of every sample, the motion of a double integrator under held inputs in closed form,
-//! and the disc as a cone at the deadline and at instants from there on. It minimises how far outside the disc the
-//! point mass is at worst. Below 0 the promise is possible. Between its instants the programme asks for nothing, so
-//! what it calls impossible is.
+//! The programme has the input of every sample, the motion of a double integrator under held inputs in closed
+//! form, and the disc as a cone at the deadline and at instants from there on. It minimises the largest
+//! distance of the point mass outside the disc. If that is below 0, the promise is feasible. Between its
+//! instants the programme requires nothing, so what it calls infeasible certainly is.
 
 use std::f64::consts::PI;
 
@@ -24,14 +24,13 @@ use crate::judge::on_every_core;
 
 /// Radius of the goal, around the origin, in m.
 const RADIUS: f64 = 2.0;
-/// Instants of a hold at which the programme asks for the disc. The chord between two of them leaves it by
-/// a (δ/4)²/8 at most: some 0.1 mm. To draw a case one is enough.
+/// Instants in a hold at which the programme requires the disc. The chord between two of them leaves it by at
+/// most a (δ/4)²/8, some 0.1 mm. To draw a case, one is enough.
 const INSTANTS: usize = 4;
-/// Least and largest ease at first, and halvings of their ratio: to 1 %.
+/// Initial bracket of the ease, and the number of halvings of its ratio: to 1 %.
 const EASE: [f64; 2] = [0.2, 3.0];
 const HALVINGS: u32 = 8;
-/// What the solver leaves open, in m: a hundred times its tolerance of 1e-8, for ways of some
-/// 100 m.
+/// Tolerance of the solver in m: a hundred times its tolerance of 1e-8, for distances of some 100 m.
 const SOLVED: f64 = 1e-6;
 
 /// A promise to a point mass.
@@ -48,21 +47,22 @@ struct Case {
 }
 
 impl Case {
-    /// A start outside in four of five cases, and a deadline within a fifth of the least that is possible; from inside a
-    /// speed within a fifth of the largest. Three of four are possible, many of them hardly.
+    /// A start outside in four of five cases, with a deadline within a fifth of the least feasible one; from
+    /// inside a speed within a fifth of the largest. Three of four cases are feasible, many of them barely.
     fn draw(seed: u64) -> Self {
         let mut numbers = Numbers::new(seed);
         let bound = numbers.scale(0.5, 15.0);
         let inside = numbers.chance(0.2);
         let far = RADIUS * if inside { numbers.within(0.0, 0.95) } else { numbers.scale(1.05, 20.0) };
         let [angle, heading] = [(); 2].map(|()| numbers.within(-PI, PI));
-        // From inside, the speed at which it can just stop; from outside, up to that at which it flies past.
+        // From inside, the speed at which it can just stop; from outside, up to the speed at which it
+        // overshoots.
         let speed = if inside { 1.0 } else { numbers.within(0.0, 1.2) } * (bound * far.max(RADIUS)).sqrt();
         let start = [far * angle.cos(), far * angle.sin(), speed * heading.cos(), speed * heading.sin()];
         let least = f64::max(to_rest(start[0], start[2], bound), to_rest(start[1], start[3], bound));
         let period = least / numbers.scale(30.0, 100.0);
         let case = Self { start, deadline: least, period, bound };
-        // The least ease that is possible.
+        // The least feasible ease.
         let [mut low, mut high] = EASE;
         for _ in 0..HALVINGS {
             let middle = f64::sqrt(low * high);
@@ -72,7 +72,7 @@ impl Case {
         case.eased(high * if numbers.chance(0.75) { 1.0 + aside } else { 1.0 / (1.0 + aside) })
     }
 
-    /// The same with so many times the time; from inside, with so many times less speed.
+    /// The same case with `by` times the time; from inside, with `by` times less speed.
     fn eased(self, by: f64) -> Self {
         let [x, y, v, w] = self.start;
         match self.from() > 0.0 {
@@ -81,12 +81,12 @@ impl Case {
         }
     }
 
-    /// When the disc is asked for: at once from inside.
+    /// When the disc is required: immediately if the start is inside.
     fn from(&self) -> f64 {
         if self.start[0].hypot(self.start[1]) <= RADIUS { 0.0 } else { self.deadline }
     }
 
-    /// What the filter says: nothing if it accepts.
+    /// Why the filter refuses the case; `None` if it accepts.
     fn refused(&self) -> Option<Failure> {
         let goal = DistanceDisc::new([0.0; 2], RADIUS, RADIUS).expect("valid disc");
         let filter = Filter::builder(PointMass)
@@ -102,15 +102,15 @@ impl Case {
         assurance.failure
     }
 
-    /// How far outside the disc the point mass has to be at worst, in m, at so many instants of a hold; −[`RADIUS`] where
-    /// it can rest at the centre.
+    /// The least possible value of the largest distance outside the disc, in m, at this many instants per
+    /// hold; −[`RADIUS`] if it can rest at the centre.
     fn least_outside(&self, instants: usize) -> f64 {
         let Self { start, deadline, period, bound } = *self;
-        // From the edge to rest takes √(4R/a) along an axis. Elsewhere the speed of the start has to be lost.
+        // From the edge to rest takes √(4R/a) along an axis. Otherwise the initial speed must be lost.
         let after = f64::max(3.0 * (4.0 * RADIUS / bound).sqrt(), start[2].hypot(start[3]) / bound);
         let holds = ((deadline + after) / period).ceil() as usize + 1;
         let mut programme = Programme::default();
-        // Six numbers a hold, position, velocity and input; four at the end; and how far outside.
+        // Six numbers per hold: position, velocity and input; four at the end; and the distance outside.
         let (state, input) = (|k: usize, i: usize| 6 * k + i, |k: usize, i: usize| 6 * k + 4 + i);
         let outside = 6 * holds + 4;
         for i in 0..4 {
@@ -155,13 +155,14 @@ impl Case {
     }
 }
 
-/// The least time in s to rest at 0 from `p` with speed `v`: full speed to one side, then to the other.
+/// The least time in s to come to rest at 0 from `p` with speed `v`: full input to one side, then to the
+/// other.
 fn to_rest(p: f64, v: f64, bound: f64) -> f64 {
     let side = (p + v * v.abs() / (2.0 * bound)).signum();
     (side * v + 2.0 * (v * v / 2.0 + side * bound * p).max(0.0).sqrt()) / bound
 }
 
-/// Rows b − A z in cones.
+/// Rows b − A z that lie in cones.
 #[derive(Default)]
 struct Programme {
     rows: Vec<usize>,
@@ -182,13 +183,13 @@ impl Programme {
         self.right.push(right);
     }
 
-    /// The rows since the last cone are in this one.
+    /// Puts the rows since the last cone into this one.
     fn close(&mut self, cone: fn(usize) -> SupportedConeT<f64>) {
         self.cones.push(cone(self.right.len() - self.closed));
         self.closed = self.right.len();
     }
 
-    /// The least value of the last variable.
+    /// The minimum of the last variable.
     fn least(self, last: usize) -> f64 {
         let variables = last + 1;
         let a =
@@ -206,7 +207,7 @@ impl Programme {
     }
 }
 
-/// The programme is right where the answer is known: from rest straight along x.
+/// The programme is right in a case with a known answer: from rest straight along x.
 #[test]
 fn the_programme_knows_what_is_possible() {
     let (bound, distance) = (2.0, 20.0);
@@ -214,22 +215,23 @@ fn the_programme_knows_what_is_possible() {
         let start = [-distance, 0.0, 0.0, 0.0];
         Case { start, deadline, period: deadline / 100.0, bound }.least_outside(INSTANTS)
     };
-    // The edge at 18 m with the speed from which 4 m are enough to stop: that is at rest at 22 m at best.
+    // The edge at 18 m, with a speed that takes 4 m to stop: at best it comes to rest at 22 m.
     let speed = (bound * (distance + RADIUS)).sqrt();
     let least = speed / bound + (speed - (2.0 * bound * 2.0 * RADIUS).sqrt()) / bound;
     let [late, soon] = [at(least * 1.01), at(least * 0.99)];
-    // 1 % of some 6 s at the edge, at some 4 m/s; half of it, since the far edge is as far.
+    // 1 % of some 6 s at some 4 m/s at the edge; half of it, since the far edge is equally far.
     assert!(late < -0.01 && late > -0.3, "{late}");
     assert!(soon > 0.01 && soon < 0.3, "{soon}");
-    // With time enough it rests at the centre.
+    // With enough time it comes to rest at the centre.
     let rest = at(3.0 * least);
     assert!((rest + RADIUS).abs() < 1e-3, "{rest}");
 }
 
-/// Nothing that is impossible is accepted, and most of what is possible is.
+/// Nothing infeasible is accepted, and most of what is feasible is.
 #[test]
 fn table_of_what_is_possible() {
-    /// Part of the possible starts that has to be accepted. They lie at the edge on purpose; 0.98 is the goal.
+    /// Fraction of the feasible starts that must be accepted. They are near the limit on purpose; 0.98 is the
+    /// goal.
     const ACCEPTED: f64 = 0.85;
     let count = cases(24, 1000);
     let first = 0x5ec0_0000;
@@ -237,7 +239,7 @@ fn table_of_what_is_possible() {
         let case = Case::draw(first + i);
         (case, case.least_outside(INSTANTS), case.refused())
     });
-    // How far inside the best way stays, as a part of the radius.
+    // How far inside the best trajectory stays, relative to the radius.
     let bands = [(0.1, f64::INFINITY), (0.01, 0.1), (0.001, 0.01), (0.0, 0.001)];
     println!("| best way inside by, in radii | possible | accepted |\n|---|---:|---:|");
     let (mut possible, mut accepted) = (0, 0);

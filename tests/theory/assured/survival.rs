@@ -1,4 +1,4 @@
-//! Robustness of backup plans to what their filter does not know: a delay, a weaker input, a slow actuator.
+//! Robustness of backup plans to what the filter does not know: a delay, a weaker input, a slow actuator.
 
 use std::fmt;
 
@@ -13,23 +13,23 @@ use crate::starts::drawn;
 
 /// Sampling period in s.
 const STEP: f64 = 0.02;
-/// Parts of a hold, at whose ends the plant is looked at.
+/// Number of parts of a hold; the plant is checked at their ends.
 const PARTS: usize = 10;
 /// Deadline in s, and the end of a run.
 const DEADLINE: f64 = 8.0;
 const END: f64 = 12.0;
-/// The margin that is configured, in m.
+/// The configured margin, in m.
 const MARGIN: f64 = 0.02;
 
-/// A difference between the plant and what the filter takes it to be.
+/// A difference between the plant and the filter's model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Difference {
     None,
     /// The input takes effect one sample later.
     Delay,
-    /// This part of the input is missing.
+    /// This fraction of the input is missing.
     Weak(f64),
-    /// The input follows what is commanded with this time constant in s.
+    /// The input follows the command with this time constant in s.
     Lag(f64),
 }
 
@@ -44,18 +44,19 @@ impl fmt::Display for Difference {
     }
 }
 
-/// The end of a run that was accepted.
+/// How an accepted run ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum End {
     /// Assured until the end, and kept.
     Kept,
-    /// Lost, as reported, at that time in s; and broken later by so many m, or 0.
+    /// The guarantee was lost, as reported, at this time in s; the promise was then broken by this many m, or
+    /// 0.
     Lost { at: f64, by: f64 },
-    /// Broken while it was said to be assured, by so many m.
+    /// Broken by this many m while it was reported as assured.
     Broken { by: f64 },
 }
 
-/// A goal and two obstacles on the way to it.
+/// A goal, and two obstacles on the way to it.
 fn case(plant: Plant, bounds: Input, start: [f64; 4]) -> Case {
     let disc = |start, radius, outside| Shape::Disc {
         start,
@@ -71,7 +72,7 @@ fn case(plant: Plant, bounds: Input, start: [f64; 4]) -> Case {
     Case { sets, bounds, reference: Reference::Damping(1.0), ..case }
 }
 
-/// Runs `case`; nothing where the start is refused.
+/// Runs `case`; `None` if the start is refused.
 fn run(case: &Case, difference: Difference) -> Option<End> {
     let mut filter = case.assured();
     let (mut x, mut acting, mut before, mut said) = (case.start, [0.0; 2], [0.0; 2], true);
@@ -94,7 +95,7 @@ fn run(case: &Case, difference: Difference) -> Option<End> {
                 Difference::Delay => before,
                 Difference::Weak(part) => u.map(|u| (1.0 - part) * u),
                 Difference::Lag(time) => {
-                    // The mean over the part; it is exact at its end.
+                    // The mean over the part, which is exact at its end.
                     let left = (-dt / time).exp();
                     let mean = [0, 1].map(|i| u[i] + (acting[i] - u[i]) * (1.0 - left) * time / dt);
                     acting = [0, 1].map(|i| u[i] + (acting[i] - u[i]) * left);
@@ -117,7 +118,7 @@ fn run(case: &Case, difference: Difference) -> Option<End> {
     })
 }
 
-/// How far a set that is promised is left, in its unit; 0 if none is.
+/// How far a promised set is left, in its unit; 0 if none is.
 fn outside(case: &Case, t: f64, x: &State) -> f64 {
     let is_asked = |set: &&Set| set.keeping || t >= set.deadline;
     let sets = case.sets.iter().filter(is_asked);

@@ -1,11 +1,11 @@
-//! One closed loop: plant, sets, bounds, reference input, samples; all that is needed to run it again.
+//! One closed loop: plant, sets, bounds, reference input, samples, and everything else needed to repeat it.
 
 use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Sampling};
 use punctual_study::starts;
 
 use super::model::{Input, Plant, Shape, State};
 
-/// Numbers that are always the same for a seed.
+/// Random numbers that only depend on a seed.
 pub(crate) struct Numbers(Box<dyn FnMut() -> f64>);
 
 impl Numbers {
@@ -28,20 +28,20 @@ impl Numbers {
         ((self.0)() * count as f64) as usize
     }
 
-    /// True in that part of the cases.
+    /// True in this fraction of the cases.
     pub(crate) fn chance(&mut self, part: f64) -> bool {
         (self.0)() < part
     }
 }
 
-/// A set and the promise asked for on it.
+/// A set and the promise on it.
 #[derive(Clone, Debug)]
 pub(crate) struct Set {
     pub(crate) shape: Shape,
-    /// Deadline T in s. For a set that is only kept, it is the deadline that the filter is given where it wants
+    /// Deadline T in s. For a set that is only kept, it is the deadline that the filter gets if it requires
     /// one.
     pub(crate) deadline: f64,
-    /// Whether nothing is to be reached: only a start that is inside at the anchor is to stay so.
+    /// Whether nothing has to be reached: only a start that is inside at the anchor must stay inside.
     pub(crate) keeping: bool,
     pub(crate) rate: Option<f64>,
     pub(crate) stay_rate: Option<f64>,
@@ -75,34 +75,34 @@ fn keeping() -> BarrierSettings {
     BarrierSettings::keeping()
 }
 
-/// Tells the filter the longest hold in s that may come.
-fn told(builder: FilterBuilder, longest: f64) -> FilterBuilder {
+/// Tells the filter the longest possible hold in s.
+fn announce(builder: FilterBuilder, longest: f64) -> FilterBuilder {
     builder.period_max(longest).expect("a valid period")
 }
 
-/// The references by which u_ref is chosen.
+/// How u_ref is chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Reference {
     Zero,
     /// Against the speed, with this gain.
     Damping(f64),
-    /// Out of the first set, this strong.
+    /// Out of the first set, with this strength.
     Outwards(f64),
-    /// Out of the set whose edge is nearest, this strong.
+    /// Out of the set with the nearest edge, with this strength.
     Hostile(f64),
-    /// Anew at random times, on average so long held.
+    /// Drawn again at random times, with this mean hold.
     Random {
         size: Input,
         held: f64,
     },
-    /// The same, at one end or the other.
+    /// The same, at one bound or the other.
     BangBang {
         size: Input,
         held: f64,
     },
 }
 
-/// The schedules by which samples come.
+/// When samples are taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Steps {
     Regular,
@@ -112,13 +112,13 @@ pub(crate) enum Steps {
     Scattered,
     /// 10 % of them three times as long.
     Missed,
-    /// Some of 1e-12, 1e-9 or 1e-6 s between.
+    /// Some of them 1e-12, 1e-9 or 1e-6 s long.
     Tiny,
-    /// After every nine the tenth of so many seconds.
+    /// Every tenth one has this many seconds.
     EveryTenth(f64),
-    /// One of so many seconds, the fiftieth.
+    /// Only the fiftieth has this many seconds.
     Once(f64),
-    /// Every other one of so many seconds.
+    /// Every other one has this many seconds.
     Alternating(f64),
 }
 
@@ -132,13 +132,13 @@ pub(crate) struct Case {
     pub(crate) start: State,
     pub(crate) reference: Reference,
     pub(crate) steps: Steps,
-    /// The usual step in s, which the filter is told as the first.
+    /// The usual step in s, which the filter is given as the first.
     pub(crate) step: f64,
-    /// Whether the filter is told the longest step.
-    pub(crate) told: bool,
+    /// Whether the filter is given the longest step.
+    pub(crate) announced: bool,
     /// Length of the run in s from the anchor.
     pub(crate) horizon: f64,
-    /// Seed of the numbers drawn on the way.
+    /// Seed of the numbers drawn during the run.
     pub(crate) seed: u64,
 }
 
@@ -157,7 +157,7 @@ impl Case {
             reference: Reference::Zero,
             steps: Steps::Regular,
             step,
-            told: true,
+            announced: true,
             seed: 1,
         }
     }
@@ -177,8 +177,8 @@ impl Case {
         let low = self.bounds.map(|bound| -bound);
         builder = builder.bounds(&low[..inputs], &self.bounds[..inputs]).expect("valid bounds");
         builder = builder.sampling(Sampling::Measured { first: Some(self.step) }).expect("a valid step");
-        if self.told {
-            builder = told(builder, self.longest());
+        if self.announced {
+            builder = announce(builder, self.longest());
         }
         builder.build().expect("a valid filter")
     }
@@ -193,16 +193,16 @@ impl Case {
         if self.steps == Steps::Missed { 3.0 * self.step } else { self.step }
     }
 
-    /// The longest hold that the filter knows of.
-    pub(crate) fn longest_told(&self) -> f64 {
-        if self.told { self.longest() } else { self.step }
+    /// The longest hold that the filter has been told.
+    pub(crate) fn longest_announced(&self) -> f64 {
+        if self.announced { self.longest() } else { self.step }
     }
 
-    /// The time of sample `k` + 1, after `t` of sample `k`.
+    /// The time of sample `k` + 1, if `t` is that of sample `k`.
     pub(crate) fn next_sample(&self, k: usize, t: f64, numbers: &mut Numbers) -> f64 {
         let step = self.step;
         t + match self.steps {
-            // Counts as a clock does, without the sum of its round-off.
+            // Computed like a clock, without accumulated round-off.
             Steps::Regular => return self.start_time + (k + 1) as f64 * step,
             Steps::Jittered => step * numbers.within(0.5, 1.0),
             Steps::Scattered => step * numbers.scale(0.05, 1.0),
@@ -250,7 +250,7 @@ impl Case {
         }
     }
 
-    /// Out of set `set`: the way down h.
+    /// Leads out of set `set`, in the direction of decreasing h.
     fn outwards(&self, set: usize, t: f64, x: &State, size: f64) -> Input {
         let shape = &self.sets[set].shape;
         let &Shape::Disc { start, velocity, outside, .. } = shape else {

@@ -8,9 +8,9 @@ use super::model::{Plant, Shape};
 /// The kinds of cases drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Family {
-    /// So many integrators and a line.
+    /// This many integrators and a line.
     Chain(usize),
-    /// A goal in the plane, at rest or moving, and up to so many obstacles.
+    /// A goal in the plane, at rest or moving, and up to this many obstacles.
     PointMass(usize),
     Unicycle(usize),
     Bicycle(usize),
@@ -19,7 +19,7 @@ pub(crate) enum Family {
     Cruise,
     /// A wall that moves as a sine of time.
     Wave,
-    /// Kept out of a disc, no goal; by a point mass, a unicycle or a bicycle.
+    /// A disc to avoid, without a goal; for a point mass, a unicycle or a bicycle.
     KeepOut,
     /// The unicycle of the hundred starts at 50 ms.
     Fifty,
@@ -49,7 +49,7 @@ impl Family {
         Self::Fifty,
     ];
 
-    /// The case that belongs to a seed.
+    /// The case for a seed.
     pub(crate) fn draw(self, seed: u64) -> Case {
         let mut numbers = Numbers::new(seed);
         let numbers = &mut numbers;
@@ -72,11 +72,12 @@ impl Family {
     }
 }
 
-/// The most samples until a deadline of [`assured`]: a step with a backup plan takes a thousand times as long.
+/// The most samples until a deadline of [`assured`], since a step with a backup plan takes a thousand times
+/// as long.
 const MOST_SAMPLES: f64 = 200.0;
 
-/// The case that belongs to a seed, for a filter with a backup plan: a plant with a goal and obstacles, inputs bounded,
-/// nothing moving, any of five ways to choose u_ref.
+/// The case for a seed and a filter with a backup plan: a plant with a goal and obstacles, bounded inputs,
+/// nothing moving, and any of five ways to choose u_ref.
 pub(crate) fn assured(seed: u64) -> Case {
     let mut numbers = Numbers::new(seed);
     let numbers = &mut numbers;
@@ -113,8 +114,8 @@ pub(crate) fn assured(seed: u64) -> Case {
     Case { horizon: 1.5 * deadline, seed: seed ^ 0x5eed, ..case }
 }
 
-/// Completes a case with the parts that all families have: rates, margin, sampling, bounds and reference. They
-/// suit a deadline, a size of h and the inputs that a run of that size takes.
+/// Completes a case with what all families share: rates, margin, sampling, bounds and reference. They match
+/// the deadline, the size of h and the inputs of a run of that size.
 fn common(plant: Plant, mut sets: Vec<Set>, start: &[f64], typical: [f64; 2], numbers: &mut Numbers) -> Case {
     let deadline = sets[0].deadline;
     let mut step = deadline / numbers.scale(10.0, 1000.0);
@@ -143,9 +144,9 @@ fn common(plant: Plant, mut sets: Vec<Set>, start: &[f64], typical: [f64; 2], nu
     let start_time = if numbers.chance(0.5) { 0.0 } else { numbers.within(0.0, 100.0) };
     let steps = steps[numbers.below(5)];
     let case = Case::plain(plant, sets[0].clone(), start, step);
-    let told = numbers.chance(0.5);
+    let announced = numbers.chance(0.5);
     let bounds = [0, 1].map(|i| bounds[i] * typical[i]);
-    Case { sets, bounds, reference, steps, start_time, told, ..case }
+    Case { sets, bounds, reference, steps, start_time, announced, ..case }
 }
 
 /// A margin of 0 in half of the cases, else up to 5 % of `size`.
@@ -153,7 +154,7 @@ fn margin(size: f64, numbers: &mut Numbers) -> f64 {
     if numbers.chance(0.5) { 0.0 } else { numbers.within(0.0, 0.05) * size }
 }
 
-/// States of one size in units of the deadline, outside in two of three cases.
+/// States of similar size in units of the deadline, outside in two of three cases.
 fn along_line(n: usize, numbers: &mut Numbers) -> (f64, f64, f64, Vec<f64>) {
     let (size, deadline) = (numbers.scale(0.1, 100.0), numbers.scale(0.3, 30.0));
     let inside = numbers.chance(1.0 / 3.0);
@@ -183,7 +184,7 @@ fn disc(at: [f64; 2], radius: f64, outside: bool, numbers: &mut Numbers) -> Shap
     Shape::Disc { start: at, velocity: [0.0; 2], radius, smoothing, outside }
 }
 
-/// A goal up to 100 radii away, and obstacles between and beside, none of them over the start.
+/// A goal up to 100 radii away, and obstacles in between and beside, none of which contains the start.
 fn vehicle(plant: Plant, most: usize, numbers: &mut Numbers) -> Case {
     let (radius, deadline) = (numbers.scale(0.2, 5.0), numbers.scale(0.5, 30.0));
     let inside = numbers.chance(0.2);
@@ -217,7 +218,7 @@ fn vehicle(plant: Plant, most: usize, numbers: &mut Numbers) -> Case {
         _ => ([heading, speed], [8.0 * unit, 1.0]),
     };
     let case = common(plant, sets, &[corner[0], corner[1], motion[0], motion[1]], typical, numbers);
-    // A goal that moves is where it was given at the time 0.
+    // A moving goal is at its given position at time 0.
     let mut case = case;
     for set in &mut case.sets {
         if let Shape::Disc { start, velocity, .. } = &mut set.shape {
@@ -280,7 +281,7 @@ fn wave(numbers: &mut Numbers) -> Case {
     let shape = Shape::Wave { size: size * numbers.within(0.05, 1.0), rate: 1.0 };
     let set = Set { margin: margin(size, numbers), ..Set::within(shape, deadline) };
     let mut case = common(Plant::Written(n), vec![set], &start, [3.0 * unit; 2], numbers);
-    // From a thousandth of a radian per step to several turns, one of which can look like rest.
+    // From a thousandth of a radian per step to several revolutions, one of which can look like rest.
     let angle = if numbers.chance(0.1) { 2.0 * PI } else { numbers.scale(1e-3, 20.0) };
     if let Shape::Wave { rate, .. } = &mut case.sets[0].shape {
         *rate = angle / case.step;

@@ -1,4 +1,4 @@
-//! The plants and sets of the judge: as the filter gets them, and once more in plain numbers.
+//! The plants and sets of the judge: in the form that the filter gets, and again in plain numbers.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use punctual_models::Model;
 
 use crate::chains::Chain;
 
-/// Room for the states of every plant.
+/// The most states of a plant.
 const STATES: usize = 8;
 
 pub(crate) type State = [f64; STATES];
@@ -20,22 +20,22 @@ pub(crate) type Input = [f64; 2];
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Plant {
-    /// So many integrators.
+    /// This many integrators.
     Chain(usize),
     PointMass,
     Unicycle,
     Bicycle {
         l_r: f64,
     },
-    /// The bicycle for small slip angles, the slip angle as a state, its rate as the input.
+    /// The bicycle for small slip angles, with the slip angle as a state and its rate as the input.
     SmallSlip {
         l_r: f64,
     },
-    /// The bicycle without approximation, both axles as far away, the steering angle as a state.
+    /// The bicycle without approximation, with both axles equally far away and the steering angle as a state.
     Kinematic {
         length: f64,
     },
-    /// p' = v, v' = u − a v − b v √(v² + 1); from expressions, as all that follow.
+    /// p' = v, v' = u − a v − b v √(v² + 1); given by expressions, like all that follow.
     Cart {
         drag: [f64; 2],
     },
@@ -58,7 +58,7 @@ pub(crate) enum Plant {
 pub(crate) enum Shape {
     /// sign (x₁ − at).
     Line { sign: f64, at: f64 },
-    /// A disc, its centre at `start + velocity t`; of the quadratic form without a smoothing.
+    /// A disc centred at `start + velocity t`; quadratic if it has no smoothing.
     Disc { start: [f64; 2], velocity: [f64; 2], radius: f64, smoothing: Option<f64>, outside: bool },
     /// limit² − x₁².
     Within { limit: f64 },
@@ -126,12 +126,12 @@ impl Plant {
         dx
     }
 
-    /// Rate in rad/s at which the state turns under the input: a grid must resolve it.
+    /// Rate in rad/s at which the state turns under the input, which a grid must resolve.
     pub(crate) fn turning(&self, x: &State, u: &Input, dt: f64) -> f64 {
         match self {
             Self::Unicycle => u[1].abs(),
             Self::Bicycle { l_r } => (x[3].abs() + u[0].abs() * dt) * u[1].abs() / l_r,
-            // An angle is below π/2, its tangent of that order.
+            // An angle is below π/2, with a tangent of that order.
             Self::SmallSlip { l_r: length } | Self::Kinematic { length } => {
                 (x[3].abs() + u[0].abs() * dt) * (x[4].abs() + u[1].abs() * dt) / length
             }

@@ -1,12 +1,12 @@
-//! The judge's own integrator: Dormand and Prince of order 5 with steps of its own choice.
+//! The judge's own integrator: Dormand–Prince of order 5 with adaptive steps.
 //!
-//! It shares nothing with the crate: the filter predicts by two steps of Runge-Kutta of order 4 per period.
+//! It shares nothing with the crate: the filter predicts with two Runge–Kutta steps of order 4 per period.
 
 use super::model::{Input, Plant, State};
 
-/// Tolerance of a step, as a part of 1 + |x|: a thousandth of the size that counts as broken.
+/// Tolerance of a step, relative to 1 + |x|: a thousandth of the size that counts as broken.
 const TOLERANCE: f64 = 1e-12;
-/// Most steps of one call. A state that needs more becomes not a number.
+/// The most steps of one call. A state that needs more becomes NaN.
 const STEPS: usize = 5000;
 
 const STAGES: [&[f64]; 6] = [
@@ -17,7 +17,7 @@ const STAGES: [&[f64]; 6] = [
     &[9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0],
     &[35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0],
 ];
-/// The weights of order 5 less those of order 4.
+/// The weights of order 5 minus those of order 4.
 const ERROR: [f64; 7] =
     [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
 
@@ -63,7 +63,7 @@ fn one(plant: &Plant, x: &State, u: &Input, dt: f64) -> (State, f64) {
     for i in 0..n {
         let sum: f64 = ERROR.iter().zip(&rates).map(|(w, rate)| w * rate[i]).sum();
         let part = (dt * sum).abs() / (TOLERANCE * (1.0 + x[i].abs()));
-        // Not `max`, which would hide a value that is not a number.
+        // Not `max`, which would hide a NaN.
         worst = if part > worst || part.is_nan() { part } else { worst };
     }
     (next, worst)
@@ -82,7 +82,7 @@ fn polynomial(n: usize, x: &State, input: f64, dt: f64) -> State {
     next
 }
 
-/// Against circles, for which the motion is known: turning by up to a hundred radians.
+/// Compared with circles, for which the motion is known, turning by up to a hundred radians.
 #[test]
 fn the_integrator_turns_right() {
     for turning in [0.1, 3.0, 40.0, 1000.0] {

@@ -7,17 +7,17 @@ use super::case::{Case, Numbers};
 use super::model::{Input, State};
 use super::motion::advance;
 
-/// Least number of parts of a hold at whose ends h is looked at; more where plant or set turn.
+/// The fewest parts of a hold; h is checked at their ends. There are more if plant or set turn.
 const PARTS: f64 = 20.0;
-/// The angle that plant or set may turn by within a part, rad.
+/// The angle in rad by which plant or set may turn within a part.
 const TURN: f64 = 0.3;
-/// Most parts: a run that turns faster than they resolve ends there.
+/// The most parts; a run that turns faster than they resolve ends there.
 const MOST_PARTS: f64 = 2000.0;
-/// Part of the problem's size below which h is outside. The filter meets its rows to 1e-9 of their terms, so that
-/// a promise with no margin can end that far below 0.
+/// Fraction of the problem's size below which h counts as outside. The filter meets its rows to 1e-9 of their
+/// terms, so that a promise without margin can end that far below 0.
 const TOLERANCE: f64 = 1e-9;
 
-/// A promise seen broken.
+/// An observed break of a promise.
 #[derive(Clone, Copy, Debug)]
 #[allow(dead_code, reason = "all of it is printed, to run a case again")]
 pub(crate) struct Break {
@@ -26,7 +26,7 @@ pub(crate) struct Break {
     pub(crate) sample: f64,
     pub(crate) hold: f64,
     pub(crate) h: f64,
-    /// h over the size that counts as outside.
+    /// h relative to the size that counts as outside.
     pub(crate) size: f64,
     pub(crate) phase: Phase,
 }
@@ -41,13 +41,13 @@ pub(crate) struct Promise {
     /// The first sample with h ≥ 0, and whether h < 0 at an instant from there on.
     pub(crate) arrival: Option<f64>,
     pub(crate) out_after_arrival: bool,
-    /// The lowest h where h ≥ 0 was promised, flag or not.
+    /// The lowest h when h ≥ 0 was promised, flagged or not.
     pub(crate) left: Option<Break>,
-    /// The same while the report said `on_course`, in holds as long as told and in longer ones.
+    /// The same while the report said `on_course`, in holds up to the announced length and in longer ones.
     pub(crate) broken: Option<Break>,
     pub(crate) broken_longer: Option<Break>,
     pub(crate) flagged_first: bool,
-    /// Whether the flag was false at a sample.
+    /// Whether some sample was not flagged.
     pub(crate) unflagged: bool,
     pub(crate) unmet: usize,
     /// The lowest h of all.
@@ -65,7 +65,7 @@ impl Promise {
 pub(crate) struct Run {
     pub(crate) promises: Vec<Promise>,
     pub(crate) samples: usize,
-    /// Whether the run was thrown so far, or turned so fast, that its rest was not looked at.
+    /// Whether the state went so far, or turned so fast, that the rest was not checked.
     pub(crate) ended: bool,
 }
 
@@ -106,11 +106,11 @@ pub(crate) fn run(case: &Case) -> Run {
 #[derive(Clone, Debug)]
 pub(crate) struct AssuredRun {
     pub(crate) run: Run,
-    /// Why the start was refused, if it was. Then there is no run.
+    /// Why the start was refused, if it was; then there is no run.
     pub(crate) refused: Option<Failure>,
-    /// Where the promises stand at the end.
+    /// The status of the guarantee at the end.
     pub(crate) status: AssuranceStatus,
-    /// Samples at which the plan drove, and those that were infeasible while it was assured.
+    /// Samples driven by the plan, and those that were infeasible while assured.
     pub(crate) driven: usize,
     pub(crate) infeasible: usize,
 }
@@ -126,7 +126,7 @@ impl AssuredRun {
     }
 }
 
-/// Runs `case` with a backup plan, every hold told. What is refused at the start is not run.
+/// Runs `case` with a backup plan, announcing every hold. A case refused at the start is not run.
 pub(crate) fn run_assured(case: &Case) -> AssuredRun {
     let mut filter = case.assured();
     let (states, inputs) = (case.plant.states(), case.plant.inputs());
@@ -178,7 +178,7 @@ pub(crate) fn run_assured(case: &Case) -> AssuredRun {
 struct Said {
     on_course: bool,
     phase: Phase,
-    /// Time in s into the hold from which h ≥ 0 is promised, infinite if it is not.
+    /// Time in s into the hold from which h ≥ 0 is promised; infinite if it is not.
     from: f64,
 }
 
@@ -191,7 +191,7 @@ struct Judge<'a> {
     /// The parts of a hold: their ends in s, and the states there.
     grid: Vec<f64>,
     states: Vec<State>,
-    /// Whether the last hold turned faster than is resolved.
+    /// Whether the last hold turned faster than can be resolved.
     spins: bool,
 }
 
@@ -240,7 +240,8 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// The same of promises that a backup plan keeps, where it does so by its number: nothing before the deadline.
+    /// The same for promises that a backup plan keeps, as given by `assured`; nothing is promised before the
+    /// deadline.
     fn sample_assured(&mut self, t: f64, hold: f64, report: &Report, assured: impl Fn(usize) -> bool) {
         self.sample(t, hold, report);
         for (i, set) in self.case.sets.iter().enumerate() {
@@ -256,7 +257,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Moves the plant over a hold and watches every set.
+    /// Moves the plant over a hold and checks every set.
     fn hold(&mut self, t: f64, x: &State, u: &Input, hold: f64) -> State {
         self.part(t, x, u, hold);
         let mut state = *x;
@@ -273,7 +274,7 @@ impl<'a> Judge<'a> {
         state
     }
 
-    /// Divides a hold: even parts, and every deadline within it.
+    /// Divides a hold into even parts, and at every deadline within it.
     fn part(&mut self, t: f64, x: &State, u: &Input, hold: f64) {
         let mut turning = self.case.plant.turning(x, u, hold);
         for set in &self.case.sets {
@@ -294,7 +295,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Finds the lowest h of set `i` over a hold, where it is promised and where not.
+    /// Finds the lowest h of set `i` over a hold, both where it is promised and where not.
     fn watch(&mut self, i: usize, t: f64, u: &Input, hold: f64) {
         let set = &self.case.sets[i];
         let (said, floor) = (self.said[i], self.floors[i]);
@@ -303,7 +304,7 @@ impl<'a> Judge<'a> {
             self.grid.iter().zip(&self.states).map(|(s, x)| set.shape.value(t + s, x)).collect();
         let (mut least, mut promised) = (f64::INFINITY, (f64::INFINITY, 0.0));
         let mut see = |s: f64, h: f64| {
-            // A value that is not a number is not inside.
+            // NaN is not inside.
             let h = if h.is_nan() { f64::NEG_INFINITY } else { h };
             least = h.min(least);
             if s >= said.from && h < promised.0 {
@@ -333,8 +334,8 @@ impl<'a> Judge<'a> {
         }
         let (h, s) = promised;
         let found = Break { time: t + s, sample: t, hold, h, size: h / floor, phase: said.phase };
-        // A part in 1e9 more is the round-off of times that are sums.
-        let longer = hold > self.case.longest_told() * (1.0 + 1e-9);
+        // A relative difference of 1e-9 is round-off, since times are sums.
+        let longer = hold > self.case.longest_announced() * (1.0 + 1e-9);
         keep_worst(&mut promise.left, found);
         if said.on_course {
             keep_worst(if longer { &mut promise.broken_longer } else { &mut promise.broken }, found);
@@ -348,12 +349,12 @@ fn keep_worst(kept: &mut Option<Break>, found: Break) {
     }
 }
 
-/// The place at which the parabola through three points is lowest, where the middle one of them is lowest; the
-/// middle where they are on a line.
+/// The minimum of the parabola through three points of which the middle one is lowest; the middle point if
+/// they are on a line.
 fn vertex(s: [f64; 3], h: [f64; 3]) -> f64 {
     let (left, right) = ((h[1] - h[0]) / (s[1] - s[0]), (h[2] - h[1]) / (s[2] - s[1]));
     let bend = right - left;
-    // The slope is `left` in the middle of the first part, `right` in that of the second.
+    // The slope is `left` in the middle of the first part, `right` in the middle of the second.
     let found = (s[0] + s[1]) / 2.0 - left / bend * (s[2] - s[0]) / 2.0;
     if found.is_finite() { found.clamp(s[0], s[2]) } else { s[1] }
 }

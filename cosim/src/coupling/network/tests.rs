@@ -1,4 +1,4 @@
-//! Resolution of system files against made-up descriptions, one defect each.
+//! Resolves system files with one defect each against made-up descriptions.
 
 use super::super::starts::Values;
 use super::*;
@@ -78,7 +78,7 @@ fn equal_names_connect_both_ways_and_explicit_connections_win() {
     assert_eq!(network.links.len(), 2);
     assert_eq!((network.direct.as_slice(), network.delayed.as_slice()), (&[1, 2][..], &[0][..]));
     assert!(network.notes.is_empty(), "{:?}", network.notes);
-    // plant.x, plant.u, filter.u, filter.arrived, filter.x, gain.o; the text is left out.
+    // plant.x, plant.u, filter.u, filter.arrived, filter.x, gain.o; the String output is omitted.
     assert_eq!(network.recorded.len(), 6);
 
     let wiring = format!("connection = [{{ from = \"gain.o\", to = \"plant.u\", factor = 2 }}]\n{BY_NAME}");
@@ -111,7 +111,7 @@ fn undeclared_dependencies_can_be_said_to_be_none() {
     };
     let network = run("filter");
     assert_eq!((network.direct.as_slice(), network.delayed.as_slice()), (&[2][..], &[0, 1][..]));
-    // The FMU's own declaration counts.
+    // What the FMU itself declares takes precedence.
     assert_eq!(run("gain").direct, [1, 2]);
 }
 
@@ -178,7 +178,7 @@ fn each_start_value_defect_is_told_with_its_field() {
     }
 }
 
-/// A block with the vectors `v`, an input, and `w`, an output, and a parameter of each kind.
+/// A block with an input vector `v`, an output vector `w`, and a parameter of each kind.
 fn block(size: usize) -> Description {
     let mut variables = vector("v", size, Causality::Input);
     variables.extend(
@@ -254,7 +254,7 @@ fn start_values_of_arrays_are_lists_or_elements() {
     let start = |text: &str| blocks("", text).map(|network| network.starts[1].clone());
     let numbers = |values: &[f64]| Values::Numbers(values.to_vec());
     assert_eq!(start("v = [1.0, 2]").unwrap()[0].values, numbers(&[1.0, 2.0]));
-    // Elements come after the whole, and what is not given is what the description says.
+    // Elements override the whole array, and missing values come from the description.
     assert_eq!(start("\"v[2]\" = 3, v = [1, 2]").unwrap()[0].values, numbers(&[1.0, 3.0]));
     assert_eq!(start("\"v[2]\" = 3").unwrap()[0].values, numbers(&[0.0, 3.0]));
     assert_eq!(start("text = \"on\"").unwrap()[0].values, Values::Texts(vec!["on".into()]));

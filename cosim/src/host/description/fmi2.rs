@@ -1,9 +1,9 @@
-//! A model description of FMI 2.0 as an importer holds it: attributes from declared types are filled in, outputs and
-//! their dependencies are positions of variables.
+//! A model description of FMI 2.0 in the form an importer needs: attributes of declared types are filled in,
+//! and outputs and their dependencies are positions of variables.
 //!
-//! The file is parsed once. `fmi-rs` reads the tree as an importer by someone else: a text that it refuses is no
-//! description, and its findings against the standard are reported as problems. The model itself is read by
-//! `punctual_modeldescription`, from the same tree, because `fmi-rs` 0.3.4:
+//! The file is parsed once. `fmi-rs` reads the tree as an independent importer: a text that it refuses is no
+//! description, and the violations of the standard that it finds are reported as problems. The model itself
+//! is read by `punctual_modeldescription`, from the same tree, because `fmi-rs` 0.3.4:
 //!
 //! - keeps the first of the declared types only;
 //! - reads bounds of declared types as 32-bit numbers;
@@ -23,10 +23,10 @@ use roxmltree::{Document, Node};
 use super::{Output, names_library, without_co_simulation};
 use crate::error::FmuProblem;
 
-/// The description of a co-simulation FMU of FMI 2.0: a [`ModelDescription`], and what follows from it.
+/// The description of a co-simulation FMU of FMI 2.0: a [`ModelDescription`] and what is derived from it.
 ///
-/// Variables have the unit and range of their declared type where they have none of their own; a bound or
-/// time that is not a number is absent.
+/// A variable without a unit or range of its own has those of its declared type. A bound or time that is not
+/// a number counts as absent.
 #[derive(Clone, Debug)]
 pub struct Fmi2Description {
     /// The model description, as read.
@@ -54,7 +54,7 @@ impl Fmi2Description {
     ///
     /// # Errors
     ///
-    /// Text that is no model description of FMI 2.0, or of one without a co-simulation interface.
+    /// Text that is no model description of FMI 2.0, or describes no co-simulation interface.
     pub(super) fn read(document: &Document<'_>) -> Result<Self, FmuProblem> {
         let problems = judged(document.root_element())?;
         let Located { description: mut model, structure, interfaces, starts, .. } = Located::read(document);
@@ -80,15 +80,15 @@ impl Fmi2Description {
     }
 }
 
-/// The findings of `fmi-rs` against it.
+/// The violations that `fmi-rs` finds.
 fn judged(root: Node<'_, '_>) -> Result<Vec<String>, FmuProblem> {
     let read =
         importer::ModelDescription::from_node(&root).map_err(|e| FmuProblem::Description(e.to_string()))?;
     Ok(read.validate().into_iter().map(|problem| problem.message).collect())
 }
 
-/// Fills in the attributes of variables from their declared types. Of a type that is declared twice the first
-/// counts.
+/// Fills in the attributes of variables from their declared types. If a type is declared twice, the first
+/// declaration counts.
 fn fill_in(model: &mut ModelDescription) {
     let number = |value: Option<f64>| value.filter(|value| !value.is_nan());
     if let Some(experiment) = &mut model.default_experiment {

@@ -1,5 +1,5 @@
-//! A model description of FMI 3.0 as an importer holds it: arrays become scalars, attributes from declared types are
-//! filled in, outputs and their dependencies are positions of scalars.
+//! A model description of FMI 3.0 in the form an importer needs: arrays become scalars, attributes of
+//! declared types are filled in, and outputs and their dependencies are positions of scalars.
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -30,7 +30,7 @@ impl Fmi3Description {
     ///
     /// # Errors
     ///
-    /// One without a co-simulation interface, or whose library has no name.
+    /// A description without a co-simulation interface, or without a name for its library.
     pub(super) fn read(document: &Document<'_>) -> Result<Self, FmuProblem> {
         let read = fmi3::Located::read(document);
         for (v, variable) in read.description.variables.iter().enumerate() {
@@ -55,7 +55,7 @@ impl Fmi3Description {
         Ok(Self { model, co_simulation, problems: Vec::new() })
     }
 
-    /// The reason why an instance cannot be run, if there is one.
+    /// The reason why the FMU cannot be run, if there is one.
     pub(in crate::host) fn obstacle(&self) -> Option<String> {
         let is_clock = |v: &&fmi3::Variable| matches!(v.kind, VariableKind::Clock(_));
         let clock = self.model.variables.iter().find(is_clock)?;
@@ -65,7 +65,7 @@ impl Fmi3Description {
         ))
     }
 
-    /// The sizes of an array, with structural parameters at these values where they are given.
+    /// The sizes of an array, with these values for structural parameters if given.
     fn sizes(
         &self,
         variable: &fmi3::Variable,
@@ -94,7 +94,7 @@ impl Description {
     ///
     /// # Errors
     ///
-    /// Arrays without sizes or too large, and a structure that names variables which are not there.
+    /// Arrays without sizes or too large, or a structure that names missing variables.
     pub(super) fn of_fmi3(
         written: Arc<Fmi3Description>,
         structural: &BTreeMap<u32, f64>,
@@ -126,13 +126,13 @@ impl Description {
     }
 }
 
-/// Scalars while they are collected.
+/// Collects scalars.
 #[derive(Default)]
 struct Flat {
     variables: Vec<Variable>,
     arrays: Vec<Array>,
     aliases: BTreeMap<String, usize>,
-    /// First position and number of the scalars of a value reference.
+    /// For each value reference, the first position of its scalars and their number.
     places: HashMap<u32, (usize, usize)>,
     elements: u64,
 }
@@ -151,7 +151,7 @@ impl Flat {
             let what = "the elements of all variables are";
             return Err(FmuProblem::Limit { what, value: self.elements, unit: "", allowed: MAX_ELEMENTS });
         }
-        // Within the limit, so that nothing is cut off.
+        // Their product is within the limit, so no size is truncated.
         let sizes: Vec<usize> = sizes.iter().map(|size| *size as usize).collect();
         let (first, count) = (self.variables.len(), count as usize);
         if !sizes.is_empty() {
@@ -222,7 +222,7 @@ impl Flat {
     }
 }
 
-/// The start value of an element; one stands for all.
+/// The start value of an element; a single value applies to all elements.
 fn of_element<T>(starts: &[T], element: usize) -> Option<&T> {
     match starts {
         [one] => Some(one),
@@ -230,7 +230,7 @@ fn of_element<T>(starts: &[T], element: usize) -> Option<&T> {
     }
 }
 
-/// The name of an element, with its place from 1 in each dimension: `m[1,3]`. That of a scalar is its own.
+/// The name of an element, with its indices from 1 in each dimension: `m[1,3]`. A scalar keeps its own name.
 fn element_name(name: &str, sizes: &[usize], element: usize) -> String {
     if sizes.is_empty() {
         return name.to_owned();

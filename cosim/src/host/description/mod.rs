@@ -1,5 +1,5 @@
-//! A model description as couplings see it, whatever its version: scalars with names, types and value references;
-//! arrays of them; outputs and what they depend on. The descriptions as written stand behind it.
+//! A model description as the coupling sees it, in either version: scalars with names, types and value
+//! references; arrays of them; outputs and their dependencies. The original descriptions are kept as well.
 
 mod fmi2;
 mod fmi3;
@@ -27,7 +27,7 @@ pub enum Version {
 }
 
 impl Version {
-    /// Its name.
+    /// The name of the version.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Fmi2 => "FMI 2.0",
@@ -35,7 +35,7 @@ impl Version {
         }
     }
 
-    /// The beginning of the names of its functions.
+    /// The prefix of its functions' names.
     pub fn prefix(self) -> &'static str {
         match self {
             Self::Fmi2 => "fmi2",
@@ -52,18 +52,18 @@ impl Version {
     }
 }
 
-/// A scalar: a variable of FMI 2.0, or a variable of FMI 3.0, or one element of an array of it.
+/// A scalar: a variable of FMI 2.0, a scalar variable of FMI 3.0, or one element of an array variable.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variable {
-    /// Its name; of an element with its place, from 1, as in `u[2]` and `m[1,3]`.
+    /// Its name; for an element with the indices from 1, as in `u[2]` and `m[1,3]`.
     pub name: String,
     /// The handle in the C interface; elements of an array share it.
     pub value_reference: u32,
-    /// Its place in its array, row-major, from 0; of a scalar 0.
+    /// Its row-major position in its array, from 0; 0 for a scalar.
     pub element: usize,
-    /// The number of elements of its array; of a scalar 1.
+    /// The number of elements of its array; 1 for a scalar.
     pub count: usize,
-    /// The functions that read and write it.
+    /// Its data type, which determines the functions that read and write it.
     pub of: DataType,
     /// The name of its type in its version, such as `Real` or `Float64`.
     pub type_name: &'static str,
@@ -75,20 +75,20 @@ pub struct Variable {
     pub unit: Option<String>,
     /// The least and the greatest value allowed.
     pub range: (Option<f64>, Option<f64>),
-    /// Its start value; of a Boolean 0 or 1, of what is no number none.
+    /// Its start value; 0 or 1 for a Boolean, `None` if it is not a number.
     pub start: Option<f64>,
-    /// The start value of a text.
+    /// The start value of a String.
     pub text: Option<String>,
     /// The name of its declared type.
     pub declared_type: Option<String>,
-    /// Of an enumeration the names and numbers of its items.
+    /// The names and numbers of an enumeration's items.
     pub items: Vec<(String, i64)>,
-    /// Meaning for a human.
+    /// Its meaning, as a text for the reader.
     pub description: String,
 }
 
 impl Variable {
-    /// Whether it is read and written as this type by this value reference.
+    /// Whether it is accessed with this type and value reference.
     pub fn is(&self, of: DataType, reference: u32) -> bool {
         self.value_reference == reference && self.of == of
     }
@@ -98,7 +98,7 @@ impl Variable {
         self.family() != Family::Other
     }
 
-    /// What it can be connected with.
+    /// The family of types that it can be connected with.
     pub fn family(&self) -> Family {
         Family::of(self.of)
     }
@@ -122,11 +122,11 @@ pub struct Array {
 pub struct Output {
     /// Position in the variables.
     pub variable: usize,
-    /// Positions of the variables it depends on; `None`: not said, so every input.
+    /// Positions of the variables it depends on; `None` if undeclared, which means every input.
     pub dependencies: Option<Arc<[usize]>>,
 }
 
-/// The description as its file has it.
+/// The description as written in its file.
 #[derive(Clone, Debug)]
 pub enum Written {
     /// Of FMI 2.0.
@@ -137,27 +137,27 @@ pub enum Written {
 
 /// The description of a co-simulation FMU.
 ///
-/// Variables have the unit and range of their declared type where they have none of their own; a bound or
-/// time that is not a number is absent.
+/// A variable without a unit or range of its own has those of its declared type. A bound or time that is not
+/// a number counts as absent.
 #[derive(Clone, Debug)]
 pub struct Description {
-    /// The description as its file has it.
+    /// The description as written in its file.
     pub written: Written,
     /// The name of the model.
     pub model_name: String,
-    /// The meaning of the model for a human; empty: none.
+    /// The meaning of the model, as a text for the reader; may be empty.
     pub text: String,
-    /// The text that an instance is made with: `guid`, or `instantiationToken` in FMI 3.0.
+    /// The token for instantiation: `guid`, or `instantiationToken` in FMI 3.0.
     pub token: String,
-    /// The name of the shared library without its ending.
+    /// The name of the shared library without its extension.
     pub model_identifier: String,
     /// Whether only one instance can exist in one process.
     pub only_once: bool,
     /// Whether steps can differ in length.
     pub any_step: bool,
-    /// Whether states can be saved and restored, and turned to bytes.
+    /// Whether states can be saved and restored, and whether they can be serialised.
     pub states: [bool; 2],
-    /// Whether there are directional derivatives, and adjoint ones.
+    /// Whether it provides directional derivatives, and adjoint ones.
     pub derivatives: [bool; 2],
     /// Whether it needs another program to run.
     pub needs_tool: bool,
@@ -167,7 +167,7 @@ pub struct Description {
     pub variables: Vec<Variable>,
     /// All arrays, in the order of their elements.
     pub arrays: Vec<Array>,
-    /// Other names: of a scalar, or of an array, and the position of what they name in the variables.
+    /// Aliases of scalars and arrays, each with the position of what it names in the variables.
     aliases: BTreeMap<String, usize>,
     /// All outputs, in the order of the variables.
     pub outputs: Vec<Output>,
@@ -175,10 +175,10 @@ pub struct Description {
     pub problems: Vec<String>,
 }
 
-/// What there is to say of a description of FMI 1.0, or of a version that is not known here.
+/// A message on a description of FMI 1.0 or of an unknown version.
 pub(crate) fn foreign_version(document: &Document<'_>) -> Option<String> {
     let version = document.root_element().attribute("fmiVersion").unwrap_or_default();
-    // What is no version at all, such as "3", is a mistake in the file.
+    // A value that is no version at all, such as "3", is a mistake in the file.
     let (head, tail) = version.split_once('.')?;
     let is_version = head.parse::<u32>().is_ok() && tail.starts_with(|c: char| c.is_ascii_digit());
     (is_version && !["2", "3"].contains(&head)).then(|| {
@@ -188,12 +188,13 @@ pub(crate) fn foreign_version(document: &Document<'_>) -> Option<String> {
     })
 }
 
-/// Whether a model identifier can be the name of a library. The standard asks for a C identifier; other names are in the field.
+/// Whether a model identifier can be the name of a library. The standard requires a C identifier; FMUs in the
+/// field have other names too.
 fn names_library(identifier: &str) -> bool {
     !identifier.trim().is_empty() && !identifier.contains(['/', '\\', ':', '\0'])
 }
 
-/// The reason why an FMU with other interfaces only is not run.
+/// The reason why an FMU with only other interfaces is not run.
 fn without_co_simulation(interfaces: &[&str]) -> FmuProblem {
     match interfaces {
         [] => FmuProblem::NoCoSimulation,
@@ -209,8 +210,8 @@ impl Description {
     ///
     /// # Errors
     ///
-    /// Text that is no model description of FMI 2.0 or 3.0, or of one without a co-simulation interface that this
-    /// program can run.
+    /// Text that is no model description of FMI 2.0 or 3.0, or one without a co-simulation interface that
+    /// this program can run.
     pub fn parse(text: &str) -> Result<Self, FmuProblem> {
         let document = Document::parse(text).map_err(|e| FmuProblem::Description(e.to_string()))?;
         let version = document.root_element().attribute("fmiVersion").unwrap_or_default();
@@ -231,7 +232,7 @@ impl Description {
         }
     }
 
-    /// The reason why no instance can be run here, if there is one.
+    /// The reason why the FMU cannot be run here, if there is one.
     pub fn obstacle(&self) -> Option<String> {
         match &self.written {
             Written::Fmi2(_) => None,
@@ -239,7 +240,7 @@ impl Description {
         }
     }
 
-    /// The same FMU with structural parameters set to these values, by value reference.
+    /// The same FMU with these values of structural parameters, by value reference.
     ///
     /// # Errors
     ///
@@ -255,12 +256,12 @@ impl Description {
 
     /// The position of the scalar of this name.
     pub fn index_of(&self, name: &str) -> Option<usize> {
-        // A scalar that is called like an element of an array is meant before the element.
+        // A scalar whose name looks like that of an array element takes precedence over the element.
         let named = || self.variables.iter().enumerate().filter(|(_, v)| v.name == name).map(|(v, _)| v);
         named().find(|v| !self.is_element(*v)).or_else(|| named().next()).or_else(|| self.aliased(name))
     }
 
-    /// The position of the scalar that has this other name.
+    /// The position of the scalar with this alias.
     fn aliased(&self, name: &str) -> Option<usize> {
         if let Some(first) = self.aliases.get(name) {
             return self.array_from(*first).is_none().then_some(*first);
@@ -288,8 +289,8 @@ impl Description {
         self.arrays.iter().any(|array| (array.first..array.first + array.count).contains(&index))
     }
 
-    /// Whether the variable at `index` says what an enumeration of the same FMU says, for importers that drop enumerations:
-    /// the Integer `status_code` beside `status`.
+    /// Whether the variable at `index` repeats an enumeration of the same FMU for importers that drop
+    /// enumerations: the Integer `status_code` beside `status`.
     pub fn is_twin(&self, index: usize) -> bool {
         let variable = &self.variables[index];
         let is_whole = variable.family() == Family::Integer;
@@ -297,7 +298,7 @@ impl Description {
         of.is_some_and(|of| self.variables.iter().any(|v| v.name == of && v.of == DataType::Enumeration))
     }
 
-    /// What is said of the unit of the variable at `index`.
+    /// What the description says about the unit of the variable at `index`.
     pub fn unit(&self, index: usize) -> Said<'_> {
         let variable = &self.variables[index];
         let (units, is_difference) = match &self.written {
@@ -375,12 +376,12 @@ impl Description {
     }
 }
 
-/// Descriptions for the tests of those who use them.
+/// Descriptions for tests of other modules.
 #[cfg(test)]
 pub(crate) mod example {
     use super::*;
 
-    /// A variable of this name, type and causality; everything else is left out.
+    /// A variable with this name, type and causality, and defaults for everything else.
     pub(crate) fn variable(name: &str, of: DataType, causality: Causality) -> Variable {
         let type_name = match of {
             DataType::Float64 => ScalarType::Real.as_str(),
@@ -405,7 +406,7 @@ pub(crate) mod example {
         }
     }
 
-    /// A description of these variables. Outputs depend on what is said, by name.
+    /// A description with these variables. `dependencies` of outputs are given by name.
     pub(crate) fn description(
         variables: Vec<Variable>,
         dependencies: &[(&str, Option<&[&str]>)],

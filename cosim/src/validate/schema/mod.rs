@@ -1,4 +1,4 @@
-//! The XML schemas of FMI 2.0 and 3.0, as tables ([`table`]) and one pass over the document.
+//! Checks a document against the XML schemas of FMI 2.0 and 3.0: [`table`]s, and one pass over the document.
 
 mod table;
 mod types;
@@ -12,14 +12,13 @@ use punctual_modeldescription::fmi3::DataType;
 pub(super) use table::{BUILD, FMI2, FMI3, Schema, TERMINALS};
 use table::{Content, Element, Times, Use};
 
-/// The attributes that every element may have: those of the schema language itself.
+/// The namespace of attributes that every element may have: those of the schema language itself.
 const SCHEMA_INSTANCE: &str = "http://www.w3.org/2001/XMLSchema-instance";
 
-/// Parses the text of a file of the archive; a text that is not well-formed is a finding.
+/// Parses the text of a file of the archive. A text that is not well-formed is a finding.
 pub(super) fn parse<'a>(file: &str, text: &'a str, findings: &mut Findings) -> Option<Document<'a>> {
     findings.read(file, text);
-    // No document type is allowed. The number of nodes has no limit here, since the text was checked for it
-    // before.
+    // No document type is allowed. The number of nodes is unlimited here, since the text was checked before.
     let options = ParsingOptions { allow_dtd: false, ..ParsingOptions::default() };
     match Document::parse_with_options(text, options) {
         Ok(document) => {
@@ -37,8 +36,8 @@ pub(super) fn parse<'a>(file: &str, text: &'a str, findings: &mut Findings) -> O
     }
 }
 
-/// Checks the declared encoding and the byte order mark. The standard asks for UTF-8; some importers go by the bytes, others
-/// by the declaration.
+/// Checks the declared encoding and the byte order mark. The standard requires UTF-8. Some importers rely on
+/// the bytes, others on the declaration.
 fn encoding(text: &str, findings: &mut Findings) {
     if text.starts_with('\u{feff}') {
         let message =
@@ -62,7 +61,7 @@ fn place(node: Node<'_, '_>) -> Mark {
 }
 
 fn mark(node: Node<'_, '_>, at: usize) -> Mark {
-    // A variable and its type are at most this deep.
+    // A variable and its type are nested at most this deep.
     let inside = node.ancestors().take(2).find(is_variable);
     Mark { at, variable: inside.and_then(|n| n.attribute("name")).map(brief) }
 }
@@ -83,7 +82,7 @@ pub(super) fn check(document: &Document<'_>, schema: &Schema, findings: &mut Fin
         return;
     }
     let exchanges = !schema.of_exchange || root.children().any(|child| child.has_tag_name("ModelExchange"));
-    // A list replaces recursion, since the file decides the depth.
+    // An explicit stack replaces recursion, since the file determines the depth.
     let mut open = vec![(root, schema.root)];
     while let Some((node, kind)) = open.pop() {
         let Some(element) = schema.elements.iter().find(|element| element.kind == kind) else { continue };
@@ -95,7 +94,7 @@ pub(super) fn check(document: &Document<'_>, schema: &Schema, findings: &mut Fin
     }
 }
 
-/// Attributes that the standard has for model exchange alone, and forbids without it.
+/// Attributes that the standard has only for model exchange, and forbids without it.
 const OF_EXCHANGE: [&str; 2] = ["reinit", "canHandleMultipleSetPerTimeInstant"];
 
 fn of_exchange(node: Node<'_, '_>, findings: &mut Findings) {
@@ -160,7 +159,7 @@ fn children<'a, 'i>(
     };
     let mut counts = vec![0_usize; rules.len()];
     let mut reached = 0;
-    // Each child: allowed here, in its order, and not too often.
+    // Each child must be allowed here, in order, and not too frequent.
     for child in node.children() {
         if let Some(text) = child.text().filter(|text| child.is_text() && !text.trim().is_empty()) {
             let message = format!("text {:?} between the elements of {name}", brief(text.trim()));
@@ -189,7 +188,7 @@ fn children<'a, 'i>(
         }
         open.push((child, rule.kind));
     }
-    // Exactly one of a choice, at least one of a mix, and every child that must be there.
+    // Exactly one of a choice, at least one of a mix, and every required child.
     for (times, wanted) in [(Times::Choice, "exactly one"), (Times::Mix, "at least one")] {
         let of = rules.iter().zip(&counts).filter(|(rule, _)| rule.times == times);
         let chosen: usize = of.clone().map(|(_, n)| *n).sum();

@@ -1,4 +1,4 @@
-//! The simple types of XML Schema that the schemas of FMI use, and the texts that they accept.
+//! The simple types of XML Schema that the schemas of FMI use, and the texts that each accepts.
 
 use punctual_modeldescription::xsd::{boolean, double, hexadecimal, integer, is_date_time, words};
 
@@ -7,7 +7,7 @@ use punctual_modeldescription::xsd::{boolean, double, hexadecimal, integer, is_d
 pub(super) enum Value {
     /// `xs:string`.
     Text,
-    /// `xs:normalizedString`: a parser makes blanks of its line breaks.
+    /// `xs:normalizedString`: a parser replaces its line breaks by blanks.
     Line,
     /// `xs:boolean`.
     Boolean,
@@ -25,7 +25,7 @@ pub(super) enum Value {
     OneOf(&'static [&'static str]),
     /// A list of these words.
     Words(&'static [&'static str]),
-    /// The version of the standard: this, or of FMI 3.0 what its schema takes for it.
+    /// The version of the standard: exactly this one, or for FMI 3.0 any that its schema accepts.
     Version(&'static str),
 }
 
@@ -35,7 +35,7 @@ pub(super) const INT: Value = Value::Whole(i32::MIN as i128, i32::MAX as i128);
 pub(super) const UNSIGNED: Value = Value::Whole(0, u32::MAX as i128);
 
 impl Value {
-    /// Accepts a text that is such a value; else says what is allowed.
+    /// Accepts a text that is such a value; otherwise returns what is allowed.
     pub(super) fn accepts(self, text: &str) -> Result<(), String> {
         let one_of = |words: &[&str]| words.join(", ");
         let (good, allowed) = match self {
@@ -76,7 +76,7 @@ impl Value {
     }
 }
 
-/// Whether a text is a version of FMI 3: `3.MINOR` or `3.MINOR.PATCH`, of a draft with a suffix after a dash.
+/// Whether a text is a version of FMI 3: `3.MINOR` or `3.MINOR.PATCH`; a draft has a suffix after a dash.
 fn is_fmi3(wanted: &str, text: &str) -> bool {
     let Some(rest) = text.strip_prefix("3.").filter(|_| wanted.starts_with('3')) else { return false };
     let (numbers, suffix) = rest.split_once('-').map_or((rest, None), |(head, tail)| (head, Some(tail)));

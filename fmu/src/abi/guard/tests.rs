@@ -1,4 +1,4 @@
-//! Panics in an export. They cannot be caused from outside; here they are caused inside.
+//! Panics in an export. They cannot be triggered from outside, so these tests cause them inside.
 
 use super::super::fmi2::{self, CallbackFunctions, Environment};
 
@@ -26,8 +26,8 @@ extern "C" fn keep(
 fn handle(messages: &mut Vec<String>) -> Handle {
     let configuration = Configuration::parse("kind = \"plant\"\nplant.model = \"unicycle\"").unwrap();
     let guid = Product::new(configuration.clone()).unwrap().guid;
-    // SAFETY: the caller passes exactly the five fixed arguments. That a function with five fixed
-    // arguments may be called as a variadic one holds on x86-64 and AArch64, not by the language.
+    // SAFETY: the caller passes exactly the five fixed arguments. Calling a function with five fixed
+    // arguments as a variadic one works on x86-64 and AArch64, though the language does not guarantee it.
     let logger = unsafe { std::mem::transmute::<*const (), fmi2::Logger>(keep as *const ()) };
     let callbacks = CallbackFunctions {
         logger: Some(logger),
@@ -52,7 +52,7 @@ impl Drop for Bomb {
     }
 }
 
-/// Tests all in one, because the hook and the last message belong to the whole process.
+/// One test for everything, because the hook and the last message belong to the whole process.
 #[test]
 fn a_panic_becomes_an_error_and_poisons_the_instance() {
     install_panic_hook();

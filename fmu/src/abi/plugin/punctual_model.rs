@@ -1,10 +1,10 @@
-//! A plant and barriers in Rust as a plug-in of Punctual: `punctual_model.h` for Rust, in one file to copy.
+//! A Punctual plug-in with a plant and barriers in Rust: `punctual_model.h` for Rust, in one file to copy.
 //!
-//! Implement [`Model`] and name it in [`export!`]; `docs/plugin.md` and `examples/plugin/arm.rs` show how. The
-//! header says what numbers are, what functions must not do, and what is tried when a model is loaded. A panic in
-//! a function makes its results numbers that are none.
+//! Implement [`Model`] and name it in [`export!`]; `docs/plugin.md` and `examples/plugin/arm.rs` show how.
+//! The header explains what numbers are, what functions must not do, and what is checked when a model is
+//! loaded. If a function panics, its results become NaN.
 //!
-//! Needs Rust 1.85 and no crate: `rustc --edition 2024 -O --crate-type cdylib arm.rs`.
+//! Requires Rust 1.85 and no crates: `rustc --edition 2024 -O --crate-type cdylib arm.rs`.
 
 #![allow(dead_code)]
 
@@ -20,7 +20,7 @@ const MAX_STATES: usize = 64;
 /// The id that stands for the literal.
 const LITERAL: u32 = u32::MAX;
 
-/// The host's calculator, which does the operations.
+/// The host's calculator, which performs the operations.
 #[repr(C)]
 pub struct Calculator {
     pub(super) host: *mut c_void,
@@ -37,7 +37,8 @@ pub struct Number<'c> {
 
 impl<'c> Number<'c> {
     fn apply(self, operation: u32, a: u32, b: u32, literal: f64) -> Self {
-        // SAFETY: the host hands a calculator over that is valid during the call, and no number outlives that.
+        // SAFETY: the host passes a calculator that is valid during the call, and no number outlives the
+        // call.
         let id = unsafe { (self.calculator.apply)(self.calculator.host, operation, a, b, literal) };
         Self { id, ..self }
     }
@@ -55,7 +56,7 @@ impl<'c> Number<'c> {
         self.apply(0, LITERAL, LITERAL, value)
     }
 
-    /// The plain value, to branch on and to look up with. A number computed from it has no derivatives.
+    /// The plain value, for branching and table lookup. A number computed from it has no derivatives.
     pub fn value(self) -> f64 {
         // SAFETY: as in `apply`.
         unsafe { (self.calculator.value)(self.calculator.host, self.id) }
@@ -66,8 +67,9 @@ impl<'c> Number<'c> {
         self.apply(5, self.id, LITERAL, exponent)
     }
 
-    /// A function given by its value and derivatives, of the orders 0, 1, …, at [`Self::value`]. A relative
-    /// degree of n needs n + 3 of them, plans ten. Between the instants at which a plan looks, nothing is known of it.
+    /// A function given by its value and derivatives, of orders 0, 1, …, at [`Self::value`]. A relative
+    /// degree of n needs n + 3 of them, backup plans need ten. Between the instants that a plan evaluates,
+    /// nothing is known of it.
     pub fn function(self, derivatives: &[f64]) -> Self {
         let away = self - self.value();
         let mut factorial: f64 = (1..derivatives.len()).map(|k| k as f64).product();
@@ -83,7 +85,7 @@ impl<'c> Number<'c> {
 
 macro_rules! functions {
     ($($name:ident $operation:literal)*) => {impl<'c> Number<'c> {$(
-        /// The function of this name.
+        /// The function with this name.
         pub fn $name(self) -> Self {
             self.of($operation)
         }
@@ -94,7 +96,7 @@ functions! { sqrt 7 exp 8 ln 9 sin 10 cos 11 tan 12 atan 13 abs 15 tanh 16 }
 
 macro_rules! functions_of_two {
     ($($name:ident $operation:literal)*) => {impl<'c> Number<'c> {$(
-        /// The function of this name.
+        /// The function with this name.
         pub fn $name(self, other: Self) -> Self {
             self.with($operation, other)
         }
@@ -141,7 +143,7 @@ impl Neg for Number<'_> {
     }
 }
 
-/// The output of a function: comes as zeros.
+/// The output of a function, initially zero.
 pub struct Output<'a> {
     ids: &'a mut [u32],
     states: usize,
@@ -180,13 +182,13 @@ impl Variable {
         Self { name, unit, description, minimum: 0.0, maximum: 0.0, start: 0.0 }
     }
 
-    /// Sets a range; an infinite end is none.
+    /// Sets a range; an infinite end means no limit.
     #[must_use]
     pub const fn within(self, minimum: f64, maximum: f64) -> Self {
         Self { minimum, maximum, ..self }
     }
 
-    /// Sets a default value: a parameter.
+    /// Sets a default value, which makes it a parameter.
     #[must_use]
     pub const fn start(self, start: f64) -> Self {
         Self { start, ..self }
@@ -204,8 +206,8 @@ pub trait Model {
     /// The barriers, in the order of the index of [`Self::barrier`]. Default: none.
     const BARRIERS: &'static [Variable] = &[];
 
-    /// Prepares the model before anything else. It is called for every instance, also while others run. So work
-    /// that must be done once needs a `OnceLock` (`get_or_init`).
+    /// Prepares the model before anything else. It is called for every instance, possibly while others run.
+    /// So work that must be done only once needs a `OnceLock` (`get_or_init`).
     ///
     /// # Errors
     ///
@@ -217,7 +219,7 @@ pub trait Model {
     /// Writes f(x) and g(x).
     fn plant<'c>(parameters: &[f64], x: &[Number<'c>], f: &mut Output<'_>, g: &mut Output<'_>);
 
-    /// Barrier `index` at the time `t` and the state `x`.
+    /// Barrier `index` at time `t` and state `x`.
     fn barrier<'c>(index: usize, parameters: &[f64], t: Number<'c>, x: &[Number<'c>]) -> Number<'c>;
 }
 
@@ -278,7 +280,7 @@ unsafe extern "C" fn initialize<M: Model>() -> *const c_char {
     }
 }
 
-/// Hands the numbers `ids` to `body`.
+/// Passes the numbers `ids` to `body`.
 fn numbers<'c, R>(calculator: &'c Calculator, ids: &[u32], body: impl FnOnce(&[Number<'c>]) -> R) -> R {
     let none = Number { id: LITERAL, calculator };
     let mut numbers = [none; MAX_STATES];
@@ -296,7 +298,7 @@ unsafe extern "C" fn plant<M: Model>(
     g: *mut u32,
 ) {
     let (states, inputs) = (M::STATES.len(), M::INPUTS.len());
-    // SAFETY: the host gives a calculator and arrays of these lengths, valid during the call.
+    // SAFETY: the host passes a calculator and arrays of these lengths, valid during the call.
     let (calculator, parameters, x, f, g) = unsafe {
         (
             &*calculator,

@@ -1,5 +1,5 @@
-//! Functions of features that the model description excludes. Each names the reason, and answers `fmi3OK` only where
-//! nothing is asked for.
+//! Functions of features that the model description excludes. Each gives the reason, and returns `fmi3OK`
+//! only if nothing is requested.
 
 use super::super::fmi3::{Binary, Boolean, Clock, Instance, IntervalQualifier, Status, Text, ValueReference};
 use super::super::guard::{Handle, guarded, none, slice};
@@ -9,7 +9,7 @@ use crate::instance::Call;
 /// Defines exports that read or write a type that no variable has.
 macro_rules! types {
     ($($name:ident($call:ident, $type:literal, $($argument:ident: $pointer:ty),*);)*) => {$(
-        /// Reads or writes a type that no variable has, so that none can be asked for.
+        /// Reads or writes a type that no variable has, so no variable can be given.
         ///
         /// # Safety
         ///
@@ -55,7 +55,7 @@ types! {
     fmi3SetBinary(Set, "Binary", _sizes: *const usize, _values: *const Binary);
 }
 
-/// Defines exports that are fine where `count` is 0, and else refused for `why`.
+/// Defines exports that succeed if `count` is 0, and are otherwise refused for the reason `why`.
 macro_rules! counted {
     ($($why:literal { $($name:ident($($before:ident: $first:ty),*; $($argument:ident: $type:ty),*);)* })*) => {$($(
         #[doc = concat!("Refused unless nothing is asked for: ", $why, ".")]

@@ -1,4 +1,4 @@
-//! The values of controllers are those of `core`, bit for bit, whenever and however often asked.
+//! The values of controllers equal those of `core`, bit for bit, whenever and however often they are read.
 
 use punctual_reference::nominal::{Heading, damping};
 
@@ -41,7 +41,7 @@ impl Bench {
         self.values.integers[self.product.layout.outputs + 2]
     }
 
-    /// The output at `inputs`, asked twice without a step and then with one: always the same.
+    /// The output at `inputs`, read twice without a step and then with one; it must always be the same.
     fn sample(&mut self, inputs: &[f64]) -> [u64; 2] {
         self.set(inputs);
         self.block.output(0.0, &mut self.values);
@@ -120,10 +120,10 @@ fn waypoints_go_on_in_steps_and_never_back() {
         assert_eq!(bench.sample(&x), wanted.map(f64::to_bits), "{x:?}");
         assert_eq!(bench.waypoint(), present as i32 + 1);
     }
-    // The last point is held when it is reached.
+    // The last point is held once it is reached.
     bench.sample(&[2.0, 5.0, 0.0, 0.0]);
     assert_eq!(bench.waypoint(), 3);
-    // Looking does not pass a point; only a step does.
+    // Reading does not pass a point; only a step does.
     bench.block.configure(&bench.values.clone()).unwrap();
     bench.set(&[1.0, 0.0, 0.0, 0.0]);
     bench.block.output(0.0, &mut bench.values);
@@ -143,7 +143,7 @@ fn points_reached_at_once_are_passed_at_once() {
     assert_eq!(bench.waypoint(), 3);
 }
 
-/// Limits would turn what is not a number into one.
+/// Limits alone would turn NaN into a number.
 #[test]
 fn a_state_that_is_not_finite_gives_no_number() {
     for bad in [f64::NAN, f64::INFINITY] {
@@ -165,7 +165,7 @@ fn expressions_are_computed_as_written() {
         let wanted = [-0.5 * x[3] + x[0] / 8.0, 3.0 * ((-x[1]).atan2(4.0 - x[0]) - x[2]).sin()];
         let found = bench.sample(&x).map(f64::from_bits);
         for (found, wanted) in found.iter().zip(wanted) {
-            // The order of operations is the same, the functions need not be.
+            // The order of operations is the same, but the functions may differ.
             assert!((found - wanted).abs() <= 1e-14 * (1.0 + wanted.abs()), "{found} {wanted}");
         }
     }
@@ -193,7 +193,7 @@ fn expressions_have_states_parameters_and_time_of_a_model_of_ones_own() {
     direction[0] = 1.0;
     block.differentiate(0.25, &values, &direction, &mut derivative).unwrap();
     assert_eq!(derivative[u], -2.5 * 2.0 * 3.0);
-    // What is not a number is handed on as such.
+    // NaN is passed on.
     values.reals[0] = f64::NAN;
     block.output(0.25, &mut values);
     assert!(values.reals[u].is_nan());

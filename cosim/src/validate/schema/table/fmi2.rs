@@ -33,7 +33,7 @@ pub(super) const ELEMENTS: &[Element] = &[
             may("numberOfEventIndicators", UNSIGNED),
         ]],
         &[
-            // Both orders are allowed. A rule beyond the schema asks for one of each.
+            // Any order and number is allowed here. A rule beyond the schema allows one CoSimulation.
             child(0, "ModelExchange", "ModelExchange", Many),
             child(0, "CoSimulation", "CoSimulation", Many),
             child(1, "UnitDefinitions", "UnitDefinitions", Maybe),
@@ -67,7 +67,7 @@ pub(super) const ELEMENTS: &[Element] = &[
             may("canHandleVariableCommunicationStepSize", Boolean),
             may("canInterpolateInputs", Boolean),
             may("maxOutputDerivativeOrder", UNSIGNED),
-            // The schema spells it so.
+            // The spelling of the schema.
             may("canRunAsynchronuously", Boolean),
             may("canBeInstantiatedOnlyOncePerProcess", Boolean),
             may("canNotUseMemoryManagementFunctions", Boolean),
@@ -129,7 +129,7 @@ pub(super) const ELEMENTS: &[Element] = &[
         &[],
     ),
     groups("IntegerType", &[&[may("quantity", Line), may("min", INT), may("max", INT)]], &[]),
-    // The schema gives these no type, so it takes anything; nothing is meant.
+    // The schema gives these no type, so they may contain anything, although nothing is intended.
     anything("Nothing", &[]),
     groups("EnumerationType", &[&[may("quantity", Line)]], &[child(0, "Item", "Item", Some)]),
     groups("Item", &[&[must("name", Line), must("value", INT), may("description", Text)]], &[]),

@@ -17,7 +17,7 @@ const BYTE: Value = Whole(i8::MIN as i128, i8::MAX as i128);
 const UNSIGNED_BYTE: Value = Whole(0, u8::MAX as i128);
 const SHORT: Value = Whole(i16::MIN as i128, i16::MAX as i128);
 const UNSIGNED_SHORT: Value = Whole(0, u16::MAX as i128);
-/// A number that is not negative, of any size.
+/// A non-negative number of any size.
 const NATURAL: Value = Whole(0, i128::MAX);
 
 // Groups of attributes, as in fmi3AttributeGroups.xsd and fmi3Variable.xsd.

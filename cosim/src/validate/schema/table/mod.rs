@@ -1,4 +1,4 @@
-//! The schemas of FMI as tables: what a row says, and a table for each version.
+//! The schemas of FMI as tables: the meaning of a row, and a table for each version.
 
 mod fmi2;
 mod fmi3;
@@ -16,9 +16,9 @@ pub(in crate::validate::schema) enum Times {
     Some,
     /// Any number of times.
     Many,
-    /// Exactly one of all those marked so.
+    /// Exactly one of all children marked so.
     Choice,
-    /// Once or more of all those marked so, together.
+    /// One or more of all children marked so, in any mix.
     Mix,
 }
 
@@ -26,25 +26,25 @@ impl Times {
     pub(in crate::validate::schema) fn most(self) -> usize {
         match self {
             Self::One | Self::Maybe => 1,
-            // A second element of a choice is reported for the whole choice.
+            // A second element of a choice is reported for the choice as a whole.
             Self::Some | Self::Many | Self::Choice | Self::Mix => usize::MAX,
         }
     }
 }
 
-/// Whether an attribute must be there.
+/// Whether an attribute is required.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::validate::schema) enum Use {
     Required,
     Optional,
 }
 
-/// Further content of an element.
+/// What an element may contain besides attributes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::validate::schema) enum Content {
-    /// Only the children of the table.
+    /// Only the children in the table.
     Elements,
-    /// Any content that a tool put there.
+    /// Any content that a tool puts there.
     Anything,
 }
 
@@ -70,16 +70,16 @@ pub(in crate::validate::schema) struct Child {
 #[derive(Debug)]
 pub(in crate::validate::schema) struct Element {
     pub(in crate::validate::schema) kind: &'static str,
-    /// Its attributes, in groups that several elements may share.
+    /// Its attributes, in groups that several elements can share.
     groups: &'static [&'static [Attribute]],
-    /// Whether it may have any other attributes too.
+    /// Whether it may have any further attributes.
     pub(in crate::validate::schema) open: bool,
     pub(in crate::validate::schema) children: &'static [Child],
     pub(in crate::validate::schema) content: Content,
 }
 
 impl Element {
-    /// Its attributes, apart from any others.
+    /// Its attributes, without any further ones.
     pub(in crate::validate::schema) fn attributes(&self) -> impl Iterator<Item = &'static Attribute> {
         self.groups.iter().copied().flatten()
     }
@@ -88,10 +88,10 @@ impl Element {
 /// The schema of a file.
 #[derive(Debug)]
 pub(in crate::validate) struct Schema {
-    /// The element at the root, which is the name of its row too.
+    /// The root element, whose row has the same name.
     pub(in crate::validate::schema) root: &'static str,
     pub(in crate::validate::schema) elements: &'static [Element],
-    /// Whether some attributes are for model exchange alone.
+    /// Whether some attributes are only for model exchange.
     pub(in crate::validate::schema) of_exchange: bool,
 }
 
