@@ -481,7 +481,7 @@ fn filter(
         let refused = start.as_ref().is_some_and(|s| s.inside && !s.promised && deadline.is_finite());
         if refused && section.begin.is_none() && section.after.is_none() && c.barrier.len() > 1 {
             warn(
-                "contains the start, so that it is to be kept from there on, and not from its deadline: did you mean `begin`?"
+                "contains the start, so it must be kept from the first step on, and not from its deadline: did you mean `begin`?"
                     .to_owned(),
             );
         }
@@ -721,7 +721,7 @@ fn filter_text(report: &FilterReport) -> String {
         };
         let (rate, stay_rate) = (anew(rate, b.chosen && b.deadline.is_none()), anew(stay_rate, b.chosen));
         let deadline =
-            b.deadline.map_or_else(|| "none: to be kept".to_owned(), |d| format!("{} s", number(d)));
+            b.deadline.map_or_else(|| "none: kept at all times".to_owned(), |d| format!("{} s", number(d)));
         let mut rows = vec![
             ("relative degree", b.relative_degree.to_string()),
             ("method", b.method.to_owned()),

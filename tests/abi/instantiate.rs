@@ -205,7 +205,7 @@ fn broken_configurations() {
             "barrier[0].radius: is 0, must be finite and >= 1e-9",
         ),
         (PLANT.replace("v = 2.0", "v = nan"), "x0.v: is NaN, must be finite"),
-        (FILTER.replace("radius", "radus"), "barrier[0].radus: is not a key here (did you mean radius?)"),
+        (FILTER.replace("radius", "radus"), "barrier[0].radus: is an unknown key (did you mean radius?)"),
         (FILTER.replace("\"point_mass\"", "\"tank\""), "plant.model: is \"tank\", must be"),
         (FILTER.replace("kind", "knd"), "kind: missing, must be"),
         (FILTER.replace("2.0", "= 2.0"), "TOML parse error"),

@@ -24,7 +24,7 @@ fn build_text(text: impl AsRef<[u8]>) -> Done {
 #[test]
 fn an_unknown_key() {
     build("unicycle-filter", "margin", "margn")
-        .fails(2, "my.toml: barrier[0].margn: is not a key here (did you mean margin?) (line 13)");
+        .fails(2, "my.toml: barrier[0].margn: is an unknown key (did you mean margin?) (line 13)");
 }
 
 #[test]

@@ -14,7 +14,7 @@ fn run(from: &str, to: &str) -> Done {
 #[test]
 fn an_unknown_key() {
     let done = run("stop_time", "stop");
-    done.fails(2, "system.toml: experiment.stop: is not a key here (did you mean stop_time?) (line 7)");
+    done.fails(2, "system.toml: experiment.stop: is an unknown key (did you mean stop_time?) (line 7)");
 }
 
 /// Whatever is wrong with a picture, the message names the key and what is allowed.
@@ -34,7 +34,7 @@ fn a_picture_with_a_wrong_value() {
         ),
         (
             "kind = \"time\"\nsignals = []\nx = \"a.b\"",
-            "x: is not a key here; the keys are name, title, signals, ",
+            "x: is an unknown key; the keys are name, title, signals, ",
         ),
         ("kind = \"path\"\nx = \"a.b\"", "y: missing, it must be given"),
         ("kind = \"path\"\nx = \"a.b\"\ny = 1.5", "y: is 1.5, must be a text in quotes"),

@@ -407,7 +407,7 @@ fn each_defect_is_told_with_its_field() {
     fails("runs = 10", "", "campaign.runs", "missing, it must be given");
     fails("runs = 10", "runs = 0", "campaign.runs", "is 0, must be from 1 to 9007199254740992");
     fails("seed = 7", "seed = -7", "campaign.seed", "is -7, must be a whole number >= 0");
-    fails("seed = 7", "sead = 7", "campaign.sead", "is not a key here (did you mean seed?)");
+    fails("seed = 7", "sead = 7", "campaign.sead", "is an unknown key (did you mean seed?)");
     fails("\"random\"", "\"halton\"", "campaign.sampling", "is \"halton\", must be \"random\", ");
     fails("seed = 7", "step = nan", "campaign.step", "is NaN; must be finite");
     fails("seed = 7", "stop_time = -1.0", "campaign.stop_time", "is -1 s; must be after start_time = 0 s");

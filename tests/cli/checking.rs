@@ -452,7 +452,7 @@ fn sets_that_are_apart_are_refused_by_name() {
     };
     let goal = |more: &str| disc("goal", "disc", [8.0, 2.0], 1.0, more);
     let rock = |radius: f64, more: &str| disc("rock", "obstacle", [8.5, 2.0], radius, more);
-    let within = "goal lies wholly inside rock, 0.5 m from its edge: no state is in goal and outside rock, and both are to be kept at the same time";
+    let within = "goal lies wholly inside rock, 0.5 m from its edge: no state is in goal and outside rock, but both must hold at the same time";
     assert_eq!(reason(BOUNDS, &[goal("deadline = 8.0"), rock(2.0, "")]), within);
     workshop.punctual(["check", "filter.toml"]);
     let run = workshop.punctual(["run", "filter.toml"]);
@@ -473,7 +473,7 @@ fn sets_that_are_apart_are_refused_by_name() {
         BOUNDS,
         &[disc("pickup", "disc", [8.0, 0.0], 1.0, "deadline = 6.0\nuntil_arrival = true"), home],
     );
-    let wanted = "home and pickup are 5 m apart: no state is in both; and home contains the start, so that it is to be kept from there on: did you mean `begin`?";
+    let wanted = "home and pickup are 5 m apart: no state is in both; and home contains the start, so it must be kept from the first step on: did you mean `begin`?";
     assert_eq!(said, wanted);
     // Bounds that fix the input.
     let fixed = "bounds = { u_x = [0.0, 0.0], u_y = [0.0, 0.0] }\nx0 = { v_x = 1.0 }";

@@ -123,7 +123,7 @@ fn an_obstacle_is_kept_without_a_deadline() {
             "{report}"
         );
         let text = workshop.punctual(["check", "filter.toml"]).success();
-        assert!(text.contains("deadline         none: to be kept\n"), "{text}");
+        assert!(text.contains("deadline         none: kept at all times\n"), "{text}");
         let inspected = workshop.punctual(["inspect", "filter.fmu"]).success();
         assert!(!inspected.contains("contact.deadline "), "{inspected}");
     }

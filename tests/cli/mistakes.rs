@@ -18,15 +18,15 @@ const MISTAKES: [(&str, &str, &str, &str); 38] = [
         "unicycle-filter",
         "radius",
         "raduis",
-        "barrier[0].raduis: is not a key here (did you mean radius?) (line 11)",
+        "barrier[0].raduis: is an unknown key (did you mean radius?) (line 11)",
     ),
     (
         "unicycle-filter",
         "centre",
         "center",
-        "barrier[0].center: is not a key here (did you mean centre?) (line 10)",
+        "barrier[0].center: is an unknown key (did you mean centre?) (line 10)",
     ),
-    ("unicycle-filter", "[plant]", "[Plant]", "Plant: is not a key here (did you mean plant?) (line 5)"),
+    ("unicycle-filter", "[plant]", "[Plant]", "Plant: is an unknown key (did you mean plant?) (line 5)"),
     (
         "unicycle-filter",
         "\"filter\"",
@@ -154,7 +154,7 @@ const MISTAKES: [(&str, &str, &str, &str); 38] = [
         "jerk-car-filter",
         "[plant.derivatives]",
         "[plant.derivative]",
-        "plant.derivative: is not a key here (did you mean derivatives?) (line 17)",
+        "plant.derivative: is an unknown key (did you mean derivatives?) (line 17)",
     ),
     ("jerk-car-filter", "\nv = \"acc\"", "", "plant.derivatives.v: missing, every state needs one"),
     (
@@ -227,7 +227,7 @@ const MISTAKES: [(&str, &str, &str, &str); 38] = [
         "jerk-car-filter",
         "step_size",
         "step",
-        "experiment.step: is not a key here (did you mean step_size?) (line 36)",
+        "experiment.step: is an unknown key (did you mean step_size?) (line 36)",
     ),
     (
         "jerk-car-plant",

@@ -125,12 +125,12 @@ impl fmt::Display for Named<'_> {
             ),
             Failure::Apart { barriers, contained: true } => write!(
                 f,
-                "{}; and {} contains the start, so that it is to be kept from there on: did you mean `begin`?",
+                "{}; and {} contains the start, so it must be kept from the first step on: did you mean `begin`?",
                 names.apart(barriers),
                 names.barrier(barriers[0])
             ),
             Failure::Apart { barriers, contained: false } => {
-                write!(f, "{}, and both are to be kept at the same time", names.apart(barriers))
+                write!(f, "{}, but both must hold at the same time", names.apart(barriers))
             }
             Failure::Nothing => f.write_str("nothing can be promised from there"),
             Failure::TooLong => {
@@ -173,7 +173,7 @@ mod tests {
         assert_eq!(broken.to_string(), "barrier 1 is not met at 2.5 s, by 0.25");
         assert_eq!(broken.named(&GoalAndRock).to_string(), "rock is not met at 2.5 s, by 0.25 m");
         let apart = Failure::Apart { barriers: [0, 1], contained: false };
-        let wanted = "no state is in both goal and rock, and both are to be kept at the same time";
+        let wanted = "no state is in both goal and rock, but both must hold at the same time";
         assert_eq!(apart.named(&GoalAndRock).to_string(), wanted);
     }
 }

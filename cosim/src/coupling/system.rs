@@ -660,7 +660,7 @@ signals = ["a.y"]
             (
                 "step = 0.5",
                 "step = 0.5\nsteps = 1",
-                "experiment.steps: is not a key here (did you mean step?)",
+                "experiment.steps: is an unknown key (did you mean step?)",
             ),
             (
                 "step = 0.5",

@@ -144,8 +144,8 @@ impl serde::de::Error for Refusal {
     fn unknown_field(field: &str, expected: &'static [&'static str]) -> Self {
         let near = nearest(field, expected);
         let message = match near.as_str() {
-            "" => format!("is not a key here; the keys are {}", expected.join(", ")),
-            near => format!("is not a key here{near}"),
+            "" => format!("is an unknown key; the keys are {}", expected.join(", ")),
+            near => format!("is an unknown key{near}"),
         };
         Self::custom(message).within(&shown(field))
     }
