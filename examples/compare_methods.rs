@@ -59,11 +59,11 @@ fn run(
 }
 
 fn main() -> Result<(), punctual_core::Error> {
-    let root = BarrierSettings { method: Method::RepeatedRoot, ..BarrierSettings::within(DEADLINE) };
+    let root = BarrierSettings::within(DEADLINE).method(Method::RepeatedRoot);
     let paper = run(QuadraticDisc::new(CENTRE, RADIUS)?, root, Sampling::Pointwise, |_| [0.0; 2])?;
 
     // Damping keeps the arrival gentle; the constraint is enforced over the sampling period, the default.
-    let profile = BarrierSettings { margin: 0.02, ..BarrierSettings::within(DEADLINE) };
+    let profile = BarrierSettings::within(DEADLINE).margin(0.02);
     let ours =
         run(DistanceDisc::new(CENTRE, RADIUS, RADIUS)?, profile, Sampling::default(), |x| [-x[3], 0.0])?;
 

@@ -58,7 +58,7 @@ fn main() -> Result<(), punctual_core::Error> {
     let found = lie::detected(&ARM, &window);
     assert_eq!(found, lie::RelativeDegree::Uniform(4));
     let source = lie::along(Arc::new(ARM), window, 4)?;
-    let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(DEADLINE) };
+    let settings = BarrierSettings::within(DEADLINE).margin(0.02);
     let mut filter = Filter::from_sources(4, 1).source("window", source, settings)?.build()?;
 
     // 6 s in steps of 1 ms, hanging at rest. The wanted input damps the motor and does nothing else, so that

@@ -38,7 +38,7 @@ impl Barrier<3> for Above {
 
 fn main() -> Result<(), punctual_core::Error> {
     const DEADLINE: f64 = 10.0; // s
-    let settings = BarrierSettings { margin: 0.01, ..BarrierSettings::within(DEADLINE) };
+    let settings = BarrierSettings::within(DEADLINE).margin(0.01);
     let mut filter = Filter::builder(Lift).barrier("level", Above { level: 20.0 }, settings)?.build()?;
     assert_eq!(filter.relative_degrees().collect::<Vec<_>>(), [3], "found, not declared");
 

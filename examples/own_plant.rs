@@ -41,7 +41,7 @@ impl Barrier<2> for Beyond {
 fn main() -> Result<(), punctual_core::Error> {
     const DEADLINE: f64 = 5.0; // s
     let cart = || Cart { drag: 0.05 };
-    let settings = BarrierSettings { margin: 0.05, ..BarrierSettings::within(DEADLINE) };
+    let settings = BarrierSettings::within(DEADLINE).margin(0.05);
     let mut filter = Filter::builder(cart()).barrier("line", Beyond { line: 20.0 }, settings)?.build()?;
 
     // 10 s in steps of 10 ms from rest at 0; the driver wants to go at -1 m/s.

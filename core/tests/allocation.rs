@@ -23,7 +23,7 @@ fn the_counter_counts() {
 
 fn filters() -> Vec<(&'static str, Filter)> {
     let settings = BarrierSettings::within(5.0);
-    let repeated = BarrierSettings { method: Method::RepeatedRoot, ..settings };
+    let repeated = settings.method(Method::RepeatedRoot);
     let bounded = Filter::builder(PointMass)
         .barrier("goal", distance_disc(), settings)
         .and_then(|b| b.bounds(&[-50.0, -50.0], &[50.0, 50.0]))

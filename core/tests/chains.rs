@@ -52,7 +52,7 @@ fn kept(scheme: Scheme, x: &[f64], t: f64, dt: f64) -> bool {
     let n = x.len();
     let size = (0..n).map(|j| (x[j] * t.powi(j as i32) / factorial(j)).abs()).fold(0.0, f64::max);
     let margin = if scheme == Scheme::Pointwise { MARGIN * size } else { 0.0 };
-    let settings = FixedTimeSettings { margin, ..FixedTimeSettings::within(t) };
+    let settings = FixedTimeSettings::within(t).margin(margin);
     let promise = FixedTime::new(n, settings).expect("valid settings");
     let mut state = FixedTimeState::default();
     let mut x = x.to_vec();

@@ -82,8 +82,7 @@ fn distinct_rates_track_a_profile_of_ones_own() {
         let profile = Exponential { aim: 1.0, start: -20.0, rate: 1.0 };
         let mut h = profile.evaluate(&[], 4.0, 0.0)[..n].to_vec();
         let rates = Operator::new(rates).expect("valid rates");
-        let settings =
-            FixedTimeSettings { rates: Some(rates), stay_rate: Some(2.0), ..FixedTimeSettings::within(4.0) };
+        let settings = FixedTimeSettings::within(4.0).rates(rates).stay_rate(2.0);
         let promise = FixedTime::new(n, settings).and_then(|p| p.with_profile(profile)).expect("valid");
         let mut state = FixedTimeState::default();
         for k in 0..8000 {
@@ -128,18 +127,18 @@ fn a_wrong_profile_is_refused_and_replaced() {
 fn rates_have_to_fit_the_barrier() {
     let refused = |n, settings| FixedTime::new(n, settings).expect_err("refused").to_string();
     let rates = Some(Operator::new(&[1.0, 2.0]).expect("valid rates"));
-    let settings = FixedTimeSettings { rates, ..FixedTimeSettings::within(1.0) };
+    let settings = FixedTimeSettings::within(1.0).rates(rates);
     assert_eq!(refused(3, settings), "rates: has 2 components, must have 3, the relative degree");
-    let both = FixedTimeSettings { rate: Some(1.0), ..settings };
+    let both = settings.rate(1.0);
     assert_eq!(refused(2, both), "rates: given beside `rate`, which it replaces");
-    let root = FixedTimeSettings { method: punctual_core::convergence::Method::RepeatedRoot, ..settings };
+    let root = settings.method(punctual_core::convergence::Method::RepeatedRoot);
     assert_eq!(refused(2, root), "rates: belongs to the reference profile");
 }
 
 /// On the profile of the settings the floor is its own r⁽ⁿ⁾.
 #[test]
 fn the_low_peak_profile_is_followed_from_sample_to_sample() {
-    let settings = FixedTimeSettings { profile: ProfileKind::LowPeak, ..FixedTimeSettings::within(2.0) };
+    let settings = FixedTimeSettings::within(2.0).profile(ProfileKind::LowPeak);
     let promise = FixedTime::new(2, settings).expect("valid");
     let (anchor, mut state) = ([-1.0, 0.25], FixedTimeState::default());
     promise.advance(&mut state, 0.0, &anchor);

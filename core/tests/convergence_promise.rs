@@ -48,7 +48,7 @@ fn no_rate(promise: &FixedTime, state: &FixedTimeState) -> Option<NoAdmissibleRa
 }
 
 fn settings(method: Method) -> FixedTimeSettings {
-    FixedTimeSettings { method, ..FixedTimeSettings::within(5.0) }
+    FixedTimeSettings::within(5.0).method(method)
 }
 
 /// From rest the repeated root exists for even n and arrives a few samples late (theory: 5.001, 5.010,

@@ -31,7 +31,7 @@ where
     P: ControlAffine<NX, NU> + Send + Sync + 'static,
     B: Barrier<NX> + Send + 'static,
 {
-    let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(5.0) };
+    let settings = BarrierSettings::within(5.0).margin(0.02);
     Filter::builder(plant).barrier("goal", barrier, settings).and_then(FilterBuilder::build)
 }
 

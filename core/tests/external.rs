@@ -26,7 +26,7 @@ fn sources() -> [Box<dyn DerivativeSource>; 2] {
 }
 
 fn filter(sources: [Box<dyn DerivativeSource>; 2]) -> Filter {
-    let settings = BarrierSettings { margin: 0.1, ..BarrierSettings::within(DEADLINE) };
+    let settings = BarrierSettings::within(DEADLINE).margin(0.1);
     let dim = sources[0].state_dim();
     let [goal, speed] = sources;
     Filter::from_sources(dim, INPUTS)
@@ -120,7 +120,7 @@ fn the_same_bits_in_a_closed_loop_and_the_same_derivative() {
 
 #[test]
 fn without_a_prediction_a_step_is_pointwise_and_a_delay_refused() {
-    let settings = BarrierSettings { margin: 0.1, ..BarrierSettings::within(DEADLINE) };
+    let settings = BarrierSettings::within(DEADLINE).margin(0.1);
     let builder = || {
         let source = lie::external(1, 1).expect("in range");
         Filter::from_sources(3, 1).source("h", source, settings).expect("valid settings")

@@ -88,10 +88,8 @@ fn late_stay_left_and_back() {
 
 #[test]
 fn a_start_inside_stays() {
-    for settings in [
-        BarrierSettings::within(5.0),
-        BarrierSettings { method: Method::RepeatedRoot, ..BarrierSettings::within(5.0) },
-    ] {
+    for settings in [BarrierSettings::within(5.0), BarrierSettings::within(5.0).method(Method::RepeatedRoot)]
+    {
         let mut filter = goal(settings);
         let x0 = [44.0, 45.5, 0.25, 0.0];
         let schedule = Schedule { step: 0.01, steps: 800, substeps: 1 };
@@ -159,7 +157,7 @@ fn the_margin_is_reached_by_the_deadline_and_kept() {
     /// Mδ/a² for the default rate a = 4/s, δ = 1 ms and |d/dt (D + a)² e| ≤ M = 80 m/s³ near the disc.
     const SAMPLING: f64 = 80.0 * 1e-3 / (4.0 * 4.0);
     let margin = 0.25;
-    let mut filter = goal(BarrierSettings { margin, ..BarrierSettings::within(5.0) });
+    let mut filter = goal(BarrierSettings::within(5.0).margin(margin));
     let schedule = Schedule { step: 1e-3, steps: 10_000, substeps: 1 };
     let x0 = [10.0, 20.0, 3.0, -2.0];
     closed_loop(&mut filter, &PointMass, x0, schedule, damping, |t, _, _, report| {
@@ -185,7 +183,7 @@ where
 {
     /// The slack is seen at the ends of the periods; within one it may dip a little lower.
     const WITHIN_THE_PERIOD: f64 = 1.1;
-    let settings = BarrierSettings { rate: Some(5.0), stay_rate: Some(5.0), ..BarrierSettings::within(5.0) };
+    let settings = BarrierSettings::within(5.0).rate(5.0).stay_rate(5.0);
     let mut filter = pointwise(plant.clone(), distance_disc(), settings);
     let (mut deficit, mut held, mut compared) = (0.0_f64, None, 0);
     let schedule = Schedule { step, steps: (5.0 / step) as usize, substeps: 4 };
@@ -223,12 +221,7 @@ fn h_follows_its_profile_up_to_the_sampling_error() {
 fn the_arrival_of_a_bounded_one_dimensional_run_is_on_time() {
     // ẋ₁ = x₂, ẋ₂ = u, h = x₁ from −1: n = 2 by hand, through `source`.
     let source = lie::along(Arc::new(Integrator::<2>), NonNegative, 2).expect("in range");
-    let settings = BarrierSettings {
-        margin: 0.05,
-        rate: Some(3.0),
-        stay_rate: Some(3.0),
-        ..BarrierSettings::within(5.0)
-    };
+    let settings = BarrierSettings::within(5.0).margin(0.05).rate(3.0).stay_rate(3.0);
     let mut filter = Filter::from_sources(2, 1)
         .source("line", source, settings)
         .and_then(|b| b.bounds(&[-1.0], &[1.0]))
@@ -274,7 +267,7 @@ proptest! {
         repeated_root in any::<bool>(),
     ) {
         let method = if repeated_root { Method::RepeatedRoot } else { Method::ReferenceProfile };
-        let settings = BarrierSettings { method, margin: 0.1, ..BarrierSettings::within(1.0) };
+        let settings = BarrierSettings::within(1.0).method(method).margin(0.1);
         let build = || one(PointMass, quadratic_disc(), settings);
         let (mut whole, mut first, mut second) = (build(), build(), build());
         // Something else first: nothing of it may survive `restore`.
@@ -321,7 +314,7 @@ proptest! {
 #[test]
 fn two_barriers_are_both_met() {
     let mut filter = Filter::builder(PointMass)
-        .barrier("goal", distance_disc(), BarrierSettings { margin: 0.05, ..BarrierSettings::within(5.0) })
+        .barrier("goal", distance_disc(), BarrierSettings::within(5.0).margin(0.05))
         .and_then(|b| {
             b.source("line", lie::along(Arc::new(PointMass), NonNegative, 2)?, BarrierSettings::within(2.0))
         })

@@ -92,11 +92,11 @@ trait World {
 }
 
 fn within(deadline: f64) -> BarrierSettings {
-    BarrierSettings { margin: 0.02, ..BarrierSettings::within(deadline) }
+    BarrierSettings::within(deadline).margin(0.02)
 }
 
 fn keeping() -> BarrierSettings {
-    BarrierSettings { margin: 0.02, ..BarrierSettings::keeping() }
+    BarrierSettings::keeping().margin(0.02)
 }
 
 fn built<P, const NX: usize, const NU: usize>(
@@ -199,7 +199,7 @@ impl World for Chase {
     fn filter(&self) -> Filter {
         let [slow, fast] = [StateBound::at_least(3, self.speeds[0]), StateBound::at_most(3, self.speeds[1])]
             .map(|bound| bound.expect("a bound"));
-        let settings = BarrierSettings { margin: 0.0, ..keeping() };
+        let settings = keeping().margin(0.0);
         let builder = Filter::builder(Unicycle)
             .barrier("disc", self.disc, within(self.deadline))
             .and_then(|b| b.barrier("slow", slow, settings))
@@ -407,7 +407,7 @@ fn a_set_that_moves_once_is_not_promised_for_ever() {
     let assured = |pulse: Pulse, end: End| {
         let builder = Filter::builder(PointMass)
             .barrier("goal", DistanceDisc::new([3.0, 0.0], 1.0, 1.0).expect("a disc"), keeping())
-            .and_then(|b| b.barrier("gate", pulse, BarrierSettings { deadline: None, ..keeping() }))
+            .and_then(|b| b.barrier("gate", pulse, keeping().deadline(None)))
             .and_then(|b| b.window(Begin::AtOnce, end));
         built(builder, &[2.0, 2.0]).with_plans(PERIOD)
     };

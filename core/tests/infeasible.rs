@@ -193,7 +193,7 @@ fn side(normal: f64, x: f64) -> HalfPlane {
 
 /// x ≤ 1 m, slowly, and x ≥ 2 m within 1 s: from rest 1 m/s² is allowed and 6 · 2/1² m/s² needed.
 fn wall_before_goal(priorities: Option<[u32; 2]>) -> FilterBuilder<PointMass, 4, 2> {
-    let slow = BarrierSettings { rate: Some(1.0), stay_rate: Some(1.0), ..BarrierSettings::within(1.0) };
+    let slow = BarrierSettings::within(1.0).rate(1.0).stay_rate(1.0);
     let [goal, wall] = priorities.map_or([Strictness::KeepFirst; 2], |p| p.map(Strictness::Priority));
     Filter::builder(PointMass)
         .barrier("goal", side(1.0, 2.0), BarrierSettings::within(1.0))
@@ -241,8 +241,7 @@ fn situations() -> Vec<Situation> {
             // Kept at h = 0.5 m, ḣ = −3 m/s, it asks for −u ≥ −2aḣ − a²h = 10 with the largest rate, ten times the one given.
             name: "too fast towards a wall",
             filter: {
-                let slow =
-                    BarrierSettings { rate: Some(1.0), stay_rate: Some(1.0), ..BarrierSettings::within(1.0) };
+                let slow = BarrierSettings::within(1.0).rate(1.0).stay_rate(1.0);
                 let wall = Filter::builder(PointMass).barrier("wall", side(-1.0, 1.0), slow);
                 wall.expect("valid barrier")
             },

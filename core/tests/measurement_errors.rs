@@ -15,7 +15,7 @@ const PERIOD: f64 = 0.01;
 
 /// The deadline is 10 s, the rates 2/s.
 fn settings() -> BarrierSettings {
-    BarrierSettings { rate: Some(2.0), stay_rate: Some(2.0), margin: 0.1, ..BarrierSettings::within(10.0) }
+    BarrierSettings::within(10.0).rate(2.0).stay_rate(2.0).margin(0.1)
 }
 
 fn unicycle(errors: &[f64]) -> Filter {
@@ -155,7 +155,7 @@ fn what_is_refused() {
         "measurement_errors: needs an actuation_delay of 0, it is 0.01",
         with(|b| b.actuation_delay(0.01)),
     );
-    let root = BarrierSettings { method: Method::RepeatedRoot, ..BarrierSettings::within(10.0) };
+    let root = BarrierSettings::within(10.0).method(Method::RepeatedRoot);
     let done = builder(root).measurement_errors(&errors).and_then(|b| b.build());
     refused(
         "goal.measurement_errors: needs a method that allows for errors, such as the reference profile",

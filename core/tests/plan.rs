@@ -95,8 +95,8 @@ impl Vehicle {
         let (goal, clear) = (disc(GOAL), Outside(disc(OBSTACLE)));
         // Without the obstacle the goal is kept with a rate that is not chosen on the way.
         let stay_rate = (!is_beside).then_some(1.0);
-        let within = BarrierSettings { margin: 0.01, stay_rate, ..BarrierSettings::within(deadline) };
-        let keeping = BarrierSettings { margin: 0.01, ..BarrierSettings::keeping() };
+        let within = BarrierSettings::within(deadline).margin(0.01).stay_rate(stay_rate);
+        let keeping = BarrierSettings::keeping().margin(0.01);
         self.sets((goal, within), is_beside.then_some((clear, keeping)))
             .and_then(|b| b.bounds(&bounds.map(|b| -b), &bounds))
             .and_then(|b| b.sampling(sampling))
@@ -227,7 +227,7 @@ fn what_no_input_can_keep_is_refused() {
 fn the_earliest_deadline_is_taken_and_kept() {
     for infeasible in [Infeasible::Report, Infeasible::Earliest] {
         let goal = DistanceDisc::new(GOAL.0, GOAL.1, 1.0).expect("valid disc");
-        let settings = BarrierSettings { infeasible, ..BarrierSettings::within(2.0) };
+        let settings = BarrierSettings::within(2.0).infeasible(infeasible);
         let filter = Filter::builder(PointMass)
             .barrier("goal", goal, settings)
             .and_then(|b| b.bounds(&[-4.0; 2], &[4.0; 2]))
@@ -790,7 +790,7 @@ fn small_sets_are_promised_from_far_away() {
 fn a_vehicle_at_the_edge_comes_to_rest_there() {
     for margin in [0.02, 0.0] {
         let disc = DistanceDisc::new([0.0; 2], 2.0, 1.0).expect("valid disc");
-        let settings = BarrierSettings { margin, ..BarrierSettings::keeping() };
+        let settings = BarrierSettings::keeping().margin(margin);
         let filter = Filter::builder(PointMass)
             .barrier("room", disc, settings)
             .and_then(|b| b.bounds(&[-4.0; 2], &[4.0; 2]))
@@ -1162,7 +1162,7 @@ fn filters_that_plans_do_not_account_for_are_refused() {
     assert_eq!(delayed, "actuation_delay: is 0.01, must be 0 for a plan");
     let erring = refused(within, |b| b.measurement_errors(&[0.1, 0.1, 0.0, 0.0]).expect("errors"));
     assert_eq!(erring, "measurement_errors: are not 0, must be 0 for a plan");
-    let disturbed = refused(BarrierSettings { disturbance: 0.1, ..within }, |b| b);
+    let disturbed = refused(within.disturbance(0.1), |b| b);
     assert_eq!(disturbed, "goal.disturbance: is 0.1, must be 0 for a plan");
     let later = refused(within, |b| b.window(Begin::At(1.0), End::Never).expect("a window"));
     assert_eq!(later, "goal.begin: is 1, must be 0 for a plan where there is a deadline");
@@ -1463,7 +1463,7 @@ fn plans_stand_behind_an_integral_too() {
         let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0).expect("valid disc");
         let model = SmallSlipBicycle::new(LENGTH).expect("a length").with_rate();
         let filter = Filter::builder(model)
-            .barrier("goal", goal, BarrierSettings { margin: 0.02, ..BarrierSettings::within(deadline) })
+            .barrier("goal", goal, BarrierSettings::within(deadline).margin(0.02))
             .and_then(|b| b.bounds(&[-40.0, -4.0], &[40.0, 4.0]))
             .and_then(|b| b.sampling(Sampling::Period(period)))
             .and_then(FilterBuilder::build)
@@ -1581,8 +1581,8 @@ fn wall() -> impl Iterator<Item = f64> {
 fn behind_a_wall(plans: Plans) -> Filter {
     const BOUND: f64 = 4.0;
     let disc = |(centre, radius)| DistanceDisc::new(centre, radius, 1.0).expect("valid disc");
-    let within = BarrierSettings { margin: 0.01, ..BarrierSettings::within(20.0) };
-    let keeping = BarrierSettings { margin: 0.01, ..BarrierSettings::keeping() };
+    let within = BarrierSettings::within(20.0).margin(0.01);
+    let keeping = BarrierSettings::keeping().margin(0.01);
     let mut builder = Filter::builder(PointMass).barrier("goal", disc(BEHIND), within).expect("a goal");
     for (i, y) in wall().enumerate() {
         let clear = Outside(disc(([WALL[0], y], WALL[1])));

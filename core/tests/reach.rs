@@ -165,12 +165,8 @@ fn late_is_certain_exactly_when_it_is() {
 #[test]
 fn a_deadline_out_of_reach_is_postponed_and_kept() {
     for profile in [ProfileKind::Hermite, ProfileKind::LowPeak] {
-        let settings = BarrierSettings {
-            infeasible: Infeasible::Earliest,
-            profile,
-            margin: 0.01,
-            ..BarrierSettings::within(1.0)
-        };
+        let settings =
+            BarrierSettings::within(1.0).infeasible(Infeasible::Earliest).profile(profile).margin(0.01);
         let mut filter = filter(settings, 2.0);
         let schedule = Schedule { step: 0.01, steps: 1500, substeps: 1 };
         let x0 = [0.0; 4];
@@ -203,7 +199,7 @@ fn a_deadline_out_of_reach_is_postponed_and_kept() {
 #[test]
 fn low_peaks_need_smaller_bounds() {
     let bound = |profile: ProfileKind| {
-        let settings = BarrierSettings { profile, rate: Some(4.0), ..BarrierSettings::within(3.0) };
+        let settings = BarrierSettings::within(3.0).profile(profile).rate(4.0);
         let works = |limit: f64| {
             let mut filter = filter(settings, limit);
             let schedule = Schedule { step: 0.01, steps: 600, substeps: 1 };
@@ -226,7 +222,7 @@ fn low_peaks_need_smaller_bounds() {
 fn what_a_disturbance_may_do_is_not_ruled_out() {
     let start = [0.0, 0.0, 0.0, 0.0];
     for disturbance in [0.0, 60.0] {
-        let settings = BarrierSettings { disturbance, ..BarrierSettings::within(1.0) };
+        let settings = BarrierSettings::within(1.0).disturbance(disturbance);
         let line = HalfPlane::new([1.0, 0.0], [20.0, 0.0]).expect("a valid barrier");
         let mut filter = Filter::builder(PointMass)
             .barrier("line", line, settings)

@@ -19,7 +19,7 @@ use scenario::{Integrator, NonNegative, distance_disc, goal, speed_damping};
 #[test]
 fn leaving_rearms_with_the_recovery_time() {
     let recovery = 1.5;
-    let settings = BarrierSettings { recovery: Some(recovery), margin: 0.05, ..BarrierSettings::within(3.0) };
+    let settings = BarrierSettings::within(3.0).recovery(recovery).margin(0.05);
     let mut filter = goal(settings);
     let mut x = [44.0, 45.0, 0.0, 0.0];
     let (mut u, step) = ([0.0; 2], 0.01);
@@ -46,7 +46,7 @@ fn leaving_rearms_with_the_recovery_time() {
 #[test]
 fn a_recovery_time_does_not_move_the_first_deadline() {
     for recovery in [0.2, 1.5, 20.0] {
-        let settings = BarrierSettings { recovery: Some(recovery), ..BarrierSettings::within(3.0) };
+        let settings = BarrierSettings::within(3.0).recovery(recovery);
         let mut filter = goal(settings);
         let mut u = [0.0; 2];
         let mut at = |t: f64, x: f64| {
@@ -79,7 +79,7 @@ fn without_a_recovery_time_leaving_is_reported() {
 #[test]
 fn a_recovery_time_must_be_positive() {
     for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        let settings = BarrierSettings { recovery: Some(value), ..BarrierSettings::within(3.0) };
+        let settings = BarrierSettings::within(3.0).recovery(value);
         let refused = FixedTime::new(2, settings).expect_err("refused");
         assert_eq!(refused.to_string(), format!("recovery: is {value}, must be finite and > 0"));
     }
@@ -214,7 +214,7 @@ fn a_new_deadline_on_the_way() {
 /// A goal that is moved: inside the new one within the deadline that counts from the move.
 #[test]
 fn a_moved_set_on_the_way() {
-    let mut filter = goal(BarrierSettings { margin: 0.02, ..BarrierSettings::within(5.0) });
+    let mut filter = goal(BarrierSettings::within(5.0).margin(0.02));
     let mut x = [0.0, 0.0, 1.0, 0.0];
     let (mut u, step, moved_at) = ([0.0; 2], 0.01, 6.0);
     for k in 0..1500_u32 {
@@ -242,7 +242,7 @@ fn a_moved_set_on_the_way() {
 /// The repeated root from rest at odd order: the report has the fallback, the filter the reason.
 #[test]
 fn a_method_that_fails_at_the_anchor_is_reported() {
-    let settings = BarrierSettings { method: Method::RepeatedRoot, ..BarrierSettings::within(4.0) };
+    let settings = BarrierSettings::within(4.0).method(Method::RepeatedRoot);
     let mut filter = Filter::builder(Integrator::<3>)
         .barrier("line", NonNegative, settings)
         .and_then(FilterBuilder::build)
@@ -259,12 +259,7 @@ fn a_method_that_fails_at_the_anchor_is_reported() {
 /// One step of delay under a master that exchanges first: arrival and least h after the deadline, and the
 /// number of steps whose constraint could not be met.
 fn jacobi(step: f64, x0: [f64; 4]) -> (Option<f64>, f64, usize) {
-    let settings = BarrierSettings {
-        rate: Some(5.0),
-        stay_rate: Some(5.0),
-        margin: 0.02,
-        ..BarrierSettings::within(5.0)
-    };
+    let settings = BarrierSettings::within(5.0).rate(5.0).stay_rate(5.0).margin(0.02);
     let mut filter = Filter::builder(Unicycle)
         .barrier("goal", distance_disc(), settings)
         .and_then(|b| b.sampling(Sampling::Period(step)))

@@ -26,12 +26,7 @@ fn bicycle() -> Bicycle {
 }
 
 fn settings() -> BarrierSettings {
-    BarrierSettings {
-        rate: Some(5.0),
-        stay_rate: Some(5.0),
-        margin: 0.02,
-        ..BarrierSettings::within(DEADLINE)
-    }
+    BarrierSettings::within(DEADLINE).rate(5.0).stay_rate(5.0).margin(0.02)
 }
 
 fn filter<P>(plant: P, sampling: Sampling) -> Filter
@@ -144,12 +139,7 @@ proptest! {
 /// whatever the period: ψ = (D + a)ⁿ⁻¹ e never falls below e^{−aδ} of itself.
 fn psi_never_falls_faster<const N: usize>(period: f64) {
     let rate = 3.0;
-    let settings = BarrierSettings {
-        rate: Some(rate),
-        stay_rate: Some(rate),
-        margin: 0.05,
-        ..BarrierSettings::within(4.0)
-    };
+    let settings = BarrierSettings::within(4.0).rate(rate).stay_rate(rate).margin(0.05);
     let mut filter = lie::along(Arc::new(Integrator::<N>), NonNegative, N)
         .and_then(|source| Filter::from_sources(N, 1).source("line", source, settings))
         .and_then(|b| b.sampling(Sampling::Period(period)))
@@ -338,7 +328,7 @@ fn without_a_prediction_the_constraint_is_pointwise() {
         blind.peek(0.0, &first, &[0.0; 2], &mut [0.0; 2]).expect("right dimensions").barriers[0].margin;
     assert!(margin > settings().margin);
     let mut pointwise = Filter::builder(PointMass)
-        .barrier("goal", distance_disc(), BarrierSettings { margin, ..settings() })
+        .barrier("goal", distance_disc(), settings().margin(margin))
         .and_then(|b| b.sampling(Sampling::Pointwise))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
@@ -472,11 +462,7 @@ fn what_is_on_course_stands_a_disturbance_between_samples() {
     for case in 0..60_u32 {
         let part = |of: u32| f64::from(case * of % 61) / 61.0;
         let (push, period, deadline) = (0.2 + 2.0 * part(7), 0.02 + 0.18 * part(23), 1.0 + 3.0 * part(37));
-        let settings = BarrierSettings {
-            disturbance: push,
-            margin: 0.05 * part(11),
-            ..BarrierSettings::within(deadline)
-        };
+        let settings = BarrierSettings::within(deadline).disturbance(push).margin(0.05 * part(11));
         let mut filter = Filter::builder(Integrator::<1>)
             .barrier("goal", NonNegative, settings)
             .and_then(|b| b.sampling(Sampling::Period(period)))

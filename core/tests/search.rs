@@ -263,7 +263,7 @@ fn sets(random: &mut Random, with_obstacles: bool, inside: Option<[f64; 4]>) -> 
     } else {
         Set::Distance(DistanceDisc::new(centre, radius, smoothing).expect("valid disc"))
     };
-    let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(random.between(2.0, 10.0)) };
+    let settings = BarrierSettings::within(random.between(2.0, 10.0)).margin(0.02);
     let mut sets = vec![(goal, settings)];
     if with_obstacles {
         for other in &others[..1 + random.below(3)] {
@@ -410,7 +410,7 @@ impl Barrier<1> for Below {
 fn round_off_at_the_boundary_is_no_violation() {
     for period in [0.001, 0.003, 0.01, 0.03, 0.1] {
         for (margin, start) in [(0.0, 0.0), (0.0, 9.0), (0.02, 3.3)] {
-            let settings = BarrierSettings { margin, ..BarrierSettings::within(2.0) };
+            let settings = BarrierSettings::within(2.0).margin(margin);
             let mut filter = Filter::builder(Line)
                 .barrier("line", Below, settings)
                 .and_then(|b| b.sampling(Sampling::Period(period)))
@@ -494,7 +494,7 @@ fn a_step_taken_again_gives_the_same_input() {
             centre = [10.0 + 0.8 * centre[0].abs(), 0.0];
         }
         let disc = DistanceDisc::new(centre, 2.0, 2.0).expect("valid disc");
-        let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(random.between(3.0, 12.0)) };
+        let settings = BarrierSettings::within(random.between(3.0, 12.0)).margin(0.02);
         let mut filter = Filter::builder(Unicycle)
             .barrier("goal", disc, settings)
             .and_then(|b| b.sampling(Sampling::Measured { first: Some(STEP) }))
@@ -609,7 +609,7 @@ fn a_row_that_is_curved_inwards_is_solved_at_once() {
     for seed in 1..=20 {
         let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
         let disc = DistanceDisc::new([45.0, 45.0], 2.0, 2.0).expect("valid disc");
-        let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(10.0) };
+        let settings = BarrierSettings::within(10.0).margin(0.02);
         let (mut filter, promises) = build(Unicycle, &[(Set::Distance(disc), settings)], None, PERIOD);
         let mut x = [
             random.between(0.0, 20.0),

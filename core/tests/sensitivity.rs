@@ -189,20 +189,10 @@ fn filters(which: usize, form: Form) -> (Filter, usize) {
         }
         7 => {
             // Its rate changes with the anchor, and so does what a disturbance asks for over a period.
-            let settings = BarrierSettings {
-                method: Method::RepeatedRoot,
-                disturbance: 3.0,
-                ..BarrierSettings::within(4.0)
-            };
+            let settings = BarrierSettings::within(4.0).method(Method::RepeatedRoot).disturbance(3.0);
             (by_method(settings, form), 4)
         }
-        8 => (
-            by_method(
-                BarrierSettings { profile: ProfileKind::LowPeak, ..BarrierSettings::within(4.0) },
-                form,
-            ),
-            4,
-        ),
+        8 => (by_method(BarrierSettings::within(4.0).profile(ProfileKind::LowPeak), form), 4),
         9 => {
             let builder = Filter::builder(PointMass)
                 .barrier("speed", NormBound::new(2, 1.5).expect("valid"), BarrierSettings::within(2.0))
@@ -211,8 +201,7 @@ fn filters(which: usize, form: Form) -> (Filter, usize) {
         }
         10 => {
             let quadratic = QuadraticDisc::new([12.0, 4.0], 2.0).expect("valid disc");
-            let settings =
-                BarrierSettings { margin: 0.3, recovery: Some(2.0), ..BarrierSettings::within(5.0) };
+            let settings = BarrierSettings::within(5.0).margin(0.3).recovery(2.0);
             let builder = Filter::builder(Unicycle).barrier("goal", quadratic, settings).expect("valid");
             (formed(builder.erased(), form), 4)
         }
@@ -343,7 +332,7 @@ fn what_is_not_known_is_said() {
 fn a_later_deadline_is_held() {
     let with = |deadline: f64, infeasible| {
         Filter::builder(PointMass)
-            .barrier("goal", goal(), BarrierSettings { infeasible, ..BarrierSettings::within(deadline) })
+            .barrier("goal", goal(), BarrierSettings::within(deadline).infeasible(infeasible))
             .and_then(|b| b.bounds(&[-1.0; 2], &[1.0; 2])?.sampling(Sampling::Period(0.01)))
             .and_then(FilterBuilder::build)
             .expect("valid filter")

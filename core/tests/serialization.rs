@@ -94,15 +94,10 @@ fn reports_and_fresh_states_come_back() {
 
 #[test]
 fn settings_come_back() {
-    let settings = BarrierSettings {
-        method: Method::RepeatedRoot,
-        stay_rate: Some(3.0),
-        recovery: Some(0.1),
-        ..BarrierSettings::within(5.0)
-    };
+    let settings = BarrierSettings::within(5.0).method(Method::RepeatedRoot).stay_rate(3.0).recovery(0.1);
     assert_eq!(back::<BarrierSettings>(&json(&settings)), settings);
     let rates = Operator::new(&[1.0, 2.5]).ok();
-    let settings = BarrierSettings { rates, ..BarrierSettings::within(f64::INFINITY) };
+    let settings = BarrierSettings::within(f64::INFINITY).rates(rates);
     assert_eq!(back::<BarrierSettings>(&json(&settings)), settings);
     assert_eq!(back::<BarrierSettings>("{\"deadline\": 7}"), BarrierSettings::within(7.0));
     assert_eq!(back::<BarrierSettings>("{}"), BarrierSettings::keeping());

@@ -38,17 +38,17 @@ fn settings_out_of_range_are_refused() {
 
     for (value, shown) in [(-1.0, "-1"), (0.0, "0"), (f64::NAN, "NaN"), (f64::INFINITY, "inf")] {
         let message = |field: &str| format!("goal.{field}: is {shown}, must be finite and > 0");
-        bad(BarrierSettings { deadline: Some(value), ..good }, &message("deadline"));
-        bad(BarrierSettings { rate: Some(value), ..good }, &message("rate"));
-        bad(BarrierSettings { stay_rate: Some(value), ..good }, &message("stay_rate"));
+        bad(good.deadline(value), &message("deadline"));
+        bad(good.rate(value), &message("rate"));
+        bad(good.stay_rate(value), &message("stay_rate"));
     }
     for (value, shown) in [(-1.0, "-1"), (f64::NAN, "NaN"), (f64::INFINITY, "inf")] {
         let message = format!("goal.margin: is {shown}, must be finite and >= 0");
-        bad(BarrierSettings { margin: value, ..good }, &message);
+        bad(good.margin(value), &message);
         let message = format!("goal.disturbance: is {shown}, must be finite and >= 0");
-        bad(BarrierSettings { disturbance: value, ..good }, &message);
+        bad(good.disturbance(value), &message);
     }
-    assert!(build(BarrierSettings { margin: 0.0, ..good }, BOUNDS, 1e6).is_ok());
+    assert!(build(good.margin(0.0), BOUNDS, 1e6).is_ok());
 }
 
 #[test]
@@ -94,7 +94,7 @@ fn shapes_and_models_out_of_range_are_refused() {
 
 #[test]
 fn the_repeated_root_needs_relative_degree_two_or_more() {
-    let settings = BarrierSettings { method: Method::RepeatedRoot, ..BarrierSettings::within(5.0) };
+    let settings = BarrierSettings::within(5.0).method(Method::RepeatedRoot);
     let source = lie::along(Arc::new(Integrator::<1>), NonNegative, 1).expect("in range");
     refused(
         Filter::from_sources(1, 1).source("line", source, settings),

@@ -64,7 +64,7 @@ fn disc_holds(x: &[f64; 4], cx: f64, cy: f64) -> bool {
 /// on one velocity: relative degrees 1 and 2 together.
 #[test]
 fn a_corridor_obstacles_and_a_speed_limit() {
-    let keep = BarrierSettings { margin: 0.01, ..BarrierSettings::within(5.0) };
+    let keep = BarrierSettings::within(5.0).margin(0.01);
     let rock = |x, y, r| Outside(DistanceDisc::new([x, y], r, r).expect("valid disc"));
     let wall = |ny, y| HalfPlane::new([0.0, ny], [0.0, y]).expect("valid wall");
     let mut filter = Filter::builder(PointMass)

@@ -284,7 +284,7 @@ impl Candidate {
     /// `settings` with this profile and rate.
     pub fn applied(&self, settings: BarrierSettings) -> BarrierSettings {
         let rate = settings.deadline.map(|deadline| self.rate_times_deadline / deadline);
-        BarrierSettings { profile: self.profile, rate, rates: None, ..settings }
+        settings.profile(self.profile).rate(rate).rates(None)
     }
 }
 

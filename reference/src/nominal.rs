@@ -138,9 +138,8 @@ impl Heading {
         [within(self.acceleration_limit, acceleration), within(self.turn_limit, angle * self.turn_gain)]
     }
 
-    /// Acceleration (m/s²) and slip angle (rad) of the bicycle with θ̇ = vβ/l_r, x = (x_p, y_p, θ, v); `l_r`
-    /// > 0 in m. At rest it cannot turn. The slip angle is then at its limit, on the side that turns the
-    /// right way once it moves.
+    /// Acceleration (m/s²) and slip angle (rad) of the bicycle with θ̇ = vβ/l_r, x = (x_p, y_p, θ, v). `l_r` is positive, in
+    /// m. At rest it cannot turn. The slip angle is then at its limit, on the side that turns the right way once it moves.
     pub fn bicycle<S: Scalar>(&self, x: &[S; 4], l_r: f64) -> [S; 2] {
         let [acceleration, turning] = self.unicycle(x);
         let at_rest = x[3].value() == 0.0;

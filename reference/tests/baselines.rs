@@ -166,13 +166,10 @@ fn settings_that_a_condition_would_replace_are_refused() {
     let settings = BarrierSettings::within(1.0);
     assert_eq!(build(settings), None);
     assert_eq!(
-        build(BarrierSettings { method: Method::RepeatedRoot, ..settings }).unwrap(),
+        build(settings.method(Method::RepeatedRoot)).unwrap(),
         "line.method: a custom constraint replaces method and profile"
     );
-    assert_eq!(
-        build(BarrierSettings { recovery: Some(1.0), ..settings }).unwrap(),
-        "line.recovery: a custom constraint has no recovery"
-    );
+    assert_eq!(build(settings.recovery(1.0)).unwrap(), "line.recovery: a custom constraint has no recovery");
     let none = Filter::from_sources(1, 1).condition(Chain::linear(&[1.0]).unwrap()).err();
     assert_eq!(none.unwrap().to_string(), "condition: there is no barrier yet to have it");
 }
@@ -210,7 +207,7 @@ impl Condition for Complete {
 /// guarantee.
 #[test]
 fn a_condition_that_is_a_method() {
-    let settings = BarrierSettings { margin: 0.1, ..BarrierSettings::within(DEADLINE) };
+    let settings = BarrierSettings::within(DEADLINE).margin(0.1);
     let mut filter = Filter::from_sources(2, 1)
         .source("line", lie::along(Arc::new(Integrators::<2>), First, 2).expect("a source"), settings)
         .and_then(|b| b.condition(Complete))

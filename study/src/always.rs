@@ -263,7 +263,7 @@ fn point_run((task, method, nominal): (Task, Method, Nominal), x0: [f64; 4]) -> 
     let tube = |rate: f64| Tube::new(1, 1, rate);
     let filter = || {
         let disc = disc()?;
-        let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(DEADLINE) };
+        let settings = BarrierSettings::within(DEADLINE).margin(0.02);
         let builder = Filter::from_sources(2, 2);
         let builder = builder.source("goal", lie::along(Arc::new(MovedPoint), disc, 1)?, settings)?;
         let builder = builder.bounds(&bounds.map(|b| -b), &bounds)?;

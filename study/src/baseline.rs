@@ -120,8 +120,7 @@ impl Baseline {
         source: Box<dyn DerivativeSource>,
         setup: &super::Setup,
     ) -> Result<Filter, punctual_core::Error> {
-        let mut settings =
-            BarrierSettings { margin: setup.margin, ..BarrierSettings::within(setup.deadline) };
+        let mut settings = BarrierSettings::within(setup.deadline).margin(setup.margin);
         match self {
             Self::RepeatedRoot => settings.method = Method::RepeatedRoot,
             Self::LowPeak => settings.profile = ProfileKind::LowPeak,

@@ -156,13 +156,11 @@ impl Pairing {
 
     fn controlled(&self) -> Result<Filter, punctual_core::Error> {
         let Self { size, remedy, step, .. } = *self;
-        let settings = BarrierSettings {
-            rate: Some(remedy.rate),
-            stay_rate: Some(remedy.rate),
-            margin: remedy.margin,
-            disturbance: remedy.disturbance,
-            ..BarrierSettings::within(DEADLINE)
-        };
+        let settings = BarrierSettings::within(DEADLINE)
+            .rate(remedy.rate)
+            .stay_rate(remedy.rate)
+            .margin(remedy.margin)
+            .disturbance(remedy.disturbance);
         let disc = DistanceDisc::new(CENTRE, RADIUS, SMOOTHING)?;
         let integrates = self.filter != Model::Simplified;
         let (states, second) = if integrates { (5, RATE) } else { (4, size.slip) };

@@ -31,7 +31,7 @@ enum Order {
 /// The filter of examples/vehicles/unicycle-filter.toml.
 fn filter() -> Filter {
     let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0).expect("a disc");
-    let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(10.0) };
+    let settings = BarrierSettings::within(10.0).margin(0.02);
     let builder = Filter::builder(Unicycle).barrier("goal", goal, settings);
     let sampling = Sampling::Measured { first: Some(STEP) };
     builder.and_then(|b| b.sampling(sampling)).and_then(|b| b.build()).expect("a filter")

@@ -41,12 +41,7 @@ const LEAST_AFTER: f64 = 0.046;
 
 /// Arrival and least h after the deadline, from x₁ = −1 at rest until 2T.
 fn from_rest<const N: usize>(step: f64) -> (Option<f64>, f64) {
-    let settings = BarrierSettings {
-        rate: Some(3.0),
-        stay_rate: Some(3.0),
-        margin: MARGIN,
-        ..BarrierSettings::within(DEADLINE)
-    };
+    let settings = BarrierSettings::within(DEADLINE).rate(3.0).stay_rate(3.0).margin(MARGIN);
     let mut filter = lie::along(Arc::new(Chain::<N>), NonNegative, N)
         .and_then(|source| Filter::from_sources(N, 1).source("line", source, settings))
         .and_then(FilterBuilder::build)

@@ -100,12 +100,8 @@ where
 /// with 2 m/s² (|∇h| ≤ 1, so that is the bound on ḧ), and for a car that loses 10 m/s³ and whose u_ref leads
 /// back.
 fn table(count: usize) -> [[Failures; 2]; 2] {
-    let settings = |disturbance: f64| BarrierSettings {
-        rate: Some(5.0),
-        stay_rate: Some(5.0),
-        margin: MARGIN,
-        disturbance,
-        ..BarrierSettings::within(DEADLINE)
+    let settings = |disturbance: f64| {
+        BarrierSettings::within(DEADLINE).rate(5.0).stay_rate(5.0).margin(MARGIN).disturbance(disturbance)
     };
     let line = StateBound::at_least(0, 45.0).expect("a valid barrier");
     let starts = drawn(count);

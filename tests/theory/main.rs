@@ -154,7 +154,7 @@ where
 /// bands are the results of explicit Euler, semi-implicit Euler and RK4, rounded outwards.
 #[test]
 fn the_repeated_root_arrives_late_by_what_the_paper_reports() {
-    let settings = BarrierSettings { method: Method::RepeatedRoot, ..BarrierSettings::within(10.0) };
+    let settings = BarrierSettings::within(10.0).method(Method::RepeatedRoot);
     let check = |name: &str, found: Run, low: f64, high: f64| {
         let arrival = found.arrival.unwrap_or(f64::INFINITY);
         assert!((low..=high).contains(&arrival), "{name}: {arrival}, wanted {low} to {high}");
@@ -174,7 +174,7 @@ fn the_repeated_root_arrives_late_by_what_the_paper_reports() {
 /// The default method from the same start: on time, inside until 2T, with less than 10 m/s².
 #[test]
 fn the_reference_profile_arrives_on_time_and_stays() {
-    let settings = BarrierSettings { margin: 0.02, ..BarrierSettings::within(10.0) };
+    let settings = BarrierSettings::within(10.0).margin(0.02);
     let check = |name: &str, found: Run| {
         assert!(found.on_time(10.0), "{name}: {found:?}");
         assert!(found.least_after >= 0.0, "{name}: {found:?}");

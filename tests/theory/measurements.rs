@@ -38,12 +38,7 @@ where
     P: ControlAffine<NX, NU> + Copy + Send + Sync + 'static,
     B: Barrier<NX> + Copy + Send + 'static,
 {
-    let settings = BarrierSettings {
-        rate: Some(5.0),
-        stay_rate: Some(5.0),
-        margin: MARGIN,
-        ..BarrierSettings::within(DEADLINE)
-    };
+    let settings = BarrierSettings::within(DEADLINE).rate(5.0).stay_rate(5.0).margin(MARGIN);
     let mut failures = Failures::default();
     let mut random = uniform();
     for start in starts {

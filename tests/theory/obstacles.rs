@@ -53,14 +53,9 @@ where
     P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
 {
     let goal = DistanceDisc::new(GOAL.0, GOAL.1, GOAL.1).expect("valid disc");
-    let reach = BarrierSettings { margin: 0.02, ..BarrierSettings::within(DEADLINE) };
+    let reach = BarrierSettings::within(DEADLINE).margin(0.02);
     // A slow rate brakes early enough for the bounded inputs.
-    let avoid = BarrierSettings {
-        rate: Some(1.0),
-        stay_rate: Some(1.0),
-        margin: 0.1,
-        ..BarrierSettings::within(DEADLINE)
-    };
+    let avoid = BarrierSettings::within(DEADLINE).rate(1.0).stay_rate(1.0).margin(0.1);
     let mut builder = Filter::builder(plant.clone())
         .barrier("goal", goal, reach)
         .and_then(|b| b.bounds(&bounds.map(|v| -v), &bounds))

@@ -15,13 +15,7 @@ fn runs<P>(profile: ProfileKind, plant: &P, nominal: Nominal) -> Vec<Run>
 where
     P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
 {
-    let settings = BarrierSettings {
-        profile,
-        rate: Some(5.0),
-        stay_rate: Some(5.0),
-        margin: 0.02,
-        ..BarrierSettings::within(DEADLINE)
-    };
+    let settings = BarrierSettings::within(DEADLINE).profile(profile).rate(5.0).stay_rate(5.0).margin(0.02);
     let disc: DistanceDisc = distance();
     starts().iter().map(|x0| run(plant, disc, settings, nominal, STEP, *x0)).collect()
 }

@@ -21,12 +21,7 @@ const HEADING: Kinds = [
 
 /// Asserts that point mass, unicycle and bicycle are all on time and inside; returns the median peaks.
 fn all_keep_the_deadline(starts: &[[f64; 4]], nominal: Kinds, scheme: Scheme, step: f64) -> [f64; 3] {
-    let settings = BarrierSettings {
-        rate: Some(5.0),
-        stay_rate: Some(5.0),
-        margin: 0.02,
-        ..BarrierSettings::within(DEADLINE)
-    };
+    let settings = BarrierSettings::within(DEADLINE).rate(5.0).stay_rate(5.0).margin(0.02);
     let median = |name: &str, runs: Vec<Run>| {
         assert_all_keep_the_deadline(&format!("{name}, {scheme:?}, {step}"), &runs, starts);
         quantile(&runs, 0.5)
@@ -90,12 +85,7 @@ fn table_of_the_hundred_starts() {
     let all: bool = std::env::var_os("PUNCTUAL_TABLES").is_some();
     let starts = if all { starts() } else { starts()[..3].to_vec() };
     let each = |one: &dyn Fn([f64; 4]) -> Run| starts.iter().map(|x0| one(*x0)).collect::<Vec<_>>();
-    let settings = BarrierSettings {
-        rate: Some(5.0),
-        stay_rate: Some(5.0),
-        margin: 0.02,
-        ..BarrierSettings::within(DEADLINE)
-    };
+    let settings = BarrierSettings::within(DEADLINE).rate(5.0).stay_rate(5.0).margin(0.02);
     println!(
         "step, sampling: on time / inside until 2T / that with every step met / median peak / p95, per model"
     );

@@ -29,12 +29,7 @@ fn profile_runs<P>(plant: &P, nominal: Nominal, starts: &[[f64; 4]]) -> Vec<Run>
 where
     P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
 {
-    let settings = BarrierSettings {
-        rate: Some(5.0),
-        stay_rate: Some(5.0),
-        margin: 0.02,
-        ..BarrierSettings::within(DEADLINE)
-    };
+    let settings = BarrierSettings::within(DEADLINE).rate(5.0).stay_rate(5.0).margin(0.02);
     starts.iter().map(|x0| run(plant, distance(), settings, nominal, STEP, *x0)).collect()
 }
 
@@ -89,7 +84,7 @@ fn other_starts_keep_the_deadline_too() {
 #[test]
 fn the_repeated_root_on_the_hundred_starts() {
     const CHANCE: usize = 2;
-    let settings = BarrierSettings { method: Method::RepeatedRoot, ..BarrierSettings::within(DEADLINE) };
+    let settings = BarrierSettings::within(DEADLINE).method(Method::RepeatedRoot);
     let starts = starts();
     let arrivals =
         |runs: Vec<Run>| -> Vec<f64> { runs.iter().map(|r| r.arrival.unwrap_or(f64::INFINITY)).collect() };

@@ -54,11 +54,21 @@ pub enum Infeasible {
 
 /// Settings of one barrier's promise.
 ///
+/// [`Self::within`] and [`Self::keeping`] have the defaults; the method of the name of a field replaces it.
+///
+/// ```
+/// use punctual_core::filter::BarrierSettings;
+///
+/// let settings = BarrierSettings::within(10.0).margin(0.02).stay_rate(1.5);
+/// assert_eq!((settings.deadline, settings.margin, settings.rate), (Some(10.0), 0.02, None));
+/// ```
+///
 /// In a file, keys that are left out have their defaults. The [`FilterBuilder`](crate::filter::FilterBuilder) checks all
 /// numbers, whatever their source.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default = "FixedTimeSettings::keeping", deny_unknown_fields))]
+#[non_exhaustive]
 pub struct FixedTimeSettings {
     /// T in s from the anchor, finite, > 0. A deadline before the next sample is met at that sample for relative degree 1,
     /// if the filter looks over the period ([`Sampling`](crate::filter::Sampling)), and later for higher ones. `None`: the
@@ -127,6 +137,66 @@ impl FixedTimeSettings {
     /// The defaults for a set that is to be kept and has no deadline.
     pub fn keeping() -> Self {
         Self { deadline: None, ..Self::within(1.0) }
+    }
+
+    /// Replaces [`Self::deadline`](field@Self::deadline).
+    #[must_use]
+    pub fn deadline(self, deadline: impl Into<Option<f64>>) -> Self {
+        Self { deadline: deadline.into(), ..self }
+    }
+
+    /// Replaces [`Self::method`](field@Self::method).
+    #[must_use]
+    pub fn method(self, method: Method) -> Self {
+        Self { method, ..self }
+    }
+
+    /// Replaces [`Self::profile`](field@Self::profile).
+    #[must_use]
+    pub fn profile(self, profile: ProfileKind) -> Self {
+        Self { profile, ..self }
+    }
+
+    /// Replaces [`Self::infeasible`](field@Self::infeasible).
+    #[must_use]
+    pub fn infeasible(self, infeasible: Infeasible) -> Self {
+        Self { infeasible, ..self }
+    }
+
+    /// Replaces [`Self::rate`](field@Self::rate).
+    #[must_use]
+    pub fn rate(self, rate: impl Into<Option<f64>>) -> Self {
+        Self { rate: rate.into(), ..self }
+    }
+
+    /// Replaces [`Self::rates`](field@Self::rates).
+    #[must_use]
+    pub fn rates(self, rates: impl Into<Option<Operator>>) -> Self {
+        Self { rates: rates.into(), ..self }
+    }
+
+    /// Replaces [`Self::stay_rate`](field@Self::stay_rate).
+    #[must_use]
+    pub fn stay_rate(self, stay_rate: impl Into<Option<f64>>) -> Self {
+        Self { stay_rate: stay_rate.into(), ..self }
+    }
+
+    /// Replaces [`Self::margin`](field@Self::margin).
+    #[must_use]
+    pub fn margin(self, margin: f64) -> Self {
+        Self { margin, ..self }
+    }
+
+    /// Replaces [`Self::recovery`](field@Self::recovery).
+    #[must_use]
+    pub fn recovery(self, recovery: impl Into<Option<f64>>) -> Self {
+        Self { recovery: recovery.into(), ..self }
+    }
+
+    /// Replaces [`Self::disturbance`](field@Self::disturbance).
+    #[must_use]
+    pub fn disturbance(self, disturbance: f64) -> Self {
+        Self { disturbance, ..self }
     }
 
     /// The default of both rates in 1/s: the smaller of 20/T and 1/(2δ), for a deadline T > 0 and a period

@@ -66,7 +66,7 @@ impl Directional for External {
 /// ```
 /// # use punctual_core::{filter::*, lie};
 /// // h = 3 - p for p'' = u, at p = 5, p' = 2: h' = -2, and h'' = 0 - u.
-/// let settings = BarrierSettings { margin: 0.01, ..BarrierSettings::within(1.0) };
+/// let settings = BarrierSettings::within(1.0).margin(0.01);
 /// let mut filter = Filter::from_sources(4, 1)
 ///     .source("wall", lie::external(2, 1)?, settings)?
 ///     .sampling(Sampling::Pointwise)?

@@ -60,13 +60,7 @@ impl Set {
 
     fn settings(&self) -> BarrierSettings {
         let asked = if self.keeping { keeping() } else { BarrierSettings::within(self.deadline) };
-        BarrierSettings {
-            rate: self.rate,
-            stay_rate: self.stay_rate,
-            margin: self.margin,
-            recovery: self.recovery,
-            ..asked
-        }
+        asked.rate(self.rate).stay_rate(self.stay_rate).margin(self.margin).recovery(self.recovery)
     }
 }
 

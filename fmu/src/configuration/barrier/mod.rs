@@ -186,27 +186,29 @@ impl BarrierSection {
             [] => None,
             rates => Some(Operator::new(rates)?),
         };
-        Ok(BarrierSettings {
-            deadline: self.deadline,
-            method: match self.method {
-                MethodName::ReferenceProfile => Method::ReferenceProfile,
-                MethodName::RepeatedRoot => Method::RepeatedRoot,
-            },
-            profile: match self.profile {
-                ProfileName::Hermite => ProfileKind::Hermite,
-                ProfileName::LowPeak => ProfileKind::LowPeak,
-            },
-            infeasible: match self.when_infeasible {
-                InfeasibleName::Report => Infeasible::Report,
-                InfeasibleName::Earliest => Infeasible::Earliest,
-            },
-            rate: self.rate.given(),
-            rates,
-            stay_rate: self.stay_rate.given(),
-            margin: self.margin,
-            recovery: self.recovery.given(),
-            disturbance: self.disturbance.unwrap_or(0.0),
-        })
+        let method = match self.method {
+            MethodName::ReferenceProfile => Method::ReferenceProfile,
+            MethodName::RepeatedRoot => Method::RepeatedRoot,
+        };
+        let profile = match self.profile {
+            ProfileName::Hermite => ProfileKind::Hermite,
+            ProfileName::LowPeak => ProfileKind::LowPeak,
+        };
+        let infeasible = match self.when_infeasible {
+            InfeasibleName::Report => Infeasible::Report,
+            InfeasibleName::Earliest => Infeasible::Earliest,
+        };
+        Ok(BarrierSettings::keeping()
+            .deadline(self.deadline)
+            .method(method)
+            .profile(profile)
+            .infeasible(infeasible)
+            .rate(self.rate.given())
+            .rates(rates)
+            .stay_rate(self.stay_rate.given())
+            .margin(self.margin)
+            .recovery(self.recovery.given())
+            .disturbance(self.disturbance.unwrap_or(0.0)))
     }
 
     /// Its variables that are inputs: the point that it follows, or the derivatives that it is given.
