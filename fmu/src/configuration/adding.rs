@@ -14,7 +14,7 @@ use punctual_core::plants::{
 use punctual_models::Model;
 use punctual_models::evaluated::CodeModel;
 
-use super::filter::UNBOUNDED;
+use super::parameter::UNBOUNDED;
 use super::{
     BarrierSection, ConfigurationError, FilterConfiguration, ModelName, PlantSection, ReferenceSection,
 };

@@ -356,11 +356,10 @@ impl ControllerConfiguration {
                     format!("is {word:?}, which is for vehicles by name; must be \"expressions\""),
                 );
             }
-            Some(
-                model @ (ModelName::BicycleSmallSlipRate
-                | ModelName::BicycleKinematic
-                | ModelName::BicycleKinematicAngle),
-            ) if matches!(raw.controller, ControllerName::Heading | ControllerName::Waypoints) => {
+            Some(model)
+                if !model.heads()
+                    && matches!(raw.controller, ControllerName::Heading | ControllerName::Waypoints) =>
+            {
                 let message = format!(
                     "is {word:?}, which {} has none of; must be \"damping\" or \"expressions\"",
                     model.name()
@@ -533,15 +532,6 @@ impl ControllerConfiguration {
 
     /// The damped states, each with the input that acts against it, by their positions.
     pub fn damped(&self) -> &'static [(usize, usize)] {
-        let Some(model) = self.plant.model() else { return &[] };
-        match model {
-            ModelName::PointMass => &[(2, 0), (3, 1)],
-            ModelName::Unicycle
-            | ModelName::Bicycle
-            | ModelName::BicycleSmallSlip
-            | ModelName::BicycleKinematicAngle
-            | ModelName::BicycleKinematicSlip => &[(3, 0)],
-            ModelName::BicycleSmallSlipRate | ModelName::BicycleKinematic => &[(3, 0), (4, 1)],
-        }
+        self.plant.model().map_or(&[], ModelName::damped)
     }
 }

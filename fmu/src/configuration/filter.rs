@@ -18,7 +18,7 @@ use super::key::{
 };
 use super::model::RawModel;
 use super::names::{Named, check_identifier, check_known, is_reserved, taken};
-pub(super) use super::parameter::UNBOUNDED;
+use super::parameter::UNBOUNDED;
 use super::words::words;
 use super::{
     BarrierInput, BarrierSection, ConfigurationError, DisturbanceSection, EXPERIMENT, ExperimentSection,

@@ -32,59 +32,167 @@ words! {
     }
 }
 
+/// What is known of a reference plant: the one place that says it.
+struct Facts {
+    title: &'static str,
+    states: &'static [Signal],
+    inputs: &'static [Signal],
+    /// Whether it has the constants `l_r` and `l_f`.
+    constants: [bool; 2],
+    /// Whether it is affine in its inputs.
+    is_affine: bool,
+    /// The derivatives of its states as expressions.
+    derivatives: &'static [&'static str],
+    /// The states that a damping controller damps, each with the input that acts against it, by their positions.
+    damped: &'static [(usize, usize)],
+    /// Whether there are controllers that head for a goal and along waypoints.
+    heads: bool,
+}
+
 impl ModelName {
+    fn facts(self) -> Facts {
+        match self {
+            Self::PointMass => Facts {
+                title: "point mass in the plane",
+                states: PointMass::STATES,
+                inputs: PointMass::INPUTS,
+                constants: [false, false],
+                is_affine: true,
+                derivatives: &["v_x", "v_y", "u_x", "u_y"],
+                damped: &[(2, 0), (3, 1)],
+                heads: true,
+            },
+            Self::Unicycle => Facts {
+                title: "unicycle",
+                states: Unicycle::STATES,
+                inputs: Unicycle::INPUTS,
+                constants: [false, false],
+                is_affine: true,
+                derivatives: &["v*cos(theta)", "v*sin(theta)", "omega", "a"],
+                damped: &[(3, 0)],
+                heads: true,
+            },
+            Self::Bicycle => Facts {
+                title: "kinematic bicycle (simplified)",
+                states: Bicycle::STATES,
+                inputs: Bicycle::INPUTS,
+                constants: [true, false],
+                is_affine: true,
+                derivatives: &["v*cos(theta)", "v*sin(theta)", "v*beta/l_r", "a"],
+                damped: &[(3, 0)],
+                heads: true,
+            },
+            Self::BicycleSmallSlip => Facts {
+                title: "bicycle with small slip angle",
+                states: SmallSlipBicycle::STATES,
+                inputs: SmallSlipBicycle::INPUTS,
+                constants: [true, false],
+                is_affine: true,
+                derivatives: &[
+                    "v*cos(theta) - v*sin(theta)*beta",
+                    "v*sin(theta) + v*cos(theta)*beta",
+                    "v*beta/l_r",
+                    "a",
+                ],
+                damped: &[(3, 0)],
+                heads: true,
+            },
+            Self::BicycleSmallSlipRate => Facts {
+                title: "bicycle with small slip angle, steered by its rate",
+                states: SmallSlipBicycleWithRate::STATES,
+                inputs: SmallSlipBicycleWithRate::INPUTS,
+                constants: [true, false],
+                is_affine: true,
+                derivatives: &[
+                    "v*cos(theta) - v*sin(theta)*beta",
+                    "v*sin(theta) + v*cos(theta)*beta",
+                    "v*beta/l_r",
+                    "a",
+                    "beta_rate",
+                ],
+                damped: &[(3, 0), (4, 1)],
+                heads: false,
+            },
+            Self::BicycleKinematic => Facts {
+                title: "kinematic bicycle, steered by the rate of its front wheel",
+                states: KinematicBicycle::STATES,
+                inputs: KinematicBicycle::INPUTS,
+                constants: [true, true],
+                is_affine: true,
+                derivatives: &[
+                    "v*cos(theta + atan(tan(delta)*(l_r/(l_f + l_r))))",
+                    "v*sin(theta + atan(tan(delta)*(l_r/(l_f + l_r))))",
+                    "v*sin(atan(tan(delta)*(l_r/(l_f + l_r))))/l_r",
+                    "a",
+                    "delta_rate",
+                ],
+                damped: &[(3, 0), (4, 1)],
+                heads: false,
+            },
+            Self::BicycleKinematicAngle => Facts {
+                title: "kinematic bicycle, steered by the angle of its front wheel",
+                states: SteeredBicycle::STATES,
+                inputs: Steering::Angle.inputs(),
+                constants: [true, true],
+                is_affine: false,
+                derivatives: &[
+                    "v*cos(theta + atan(tan(delta)*(l_r/(l_f + l_r))))",
+                    "v*sin(theta + atan(tan(delta)*(l_r/(l_f + l_r))))",
+                    "v*sin(atan(tan(delta)*(l_r/(l_f + l_r))))/l_r",
+                    "a",
+                ],
+                damped: &[(3, 0)],
+                heads: false,
+            },
+            Self::BicycleKinematicSlip => Facts {
+                title: "kinematic bicycle, steered by its slip angle",
+                states: SteeredBicycle::STATES,
+                inputs: Steering::SlipAngle.inputs(),
+                constants: [true, false],
+                is_affine: false,
+                derivatives: &["v*cos(theta + beta)", "v*sin(theta + beta)", "v*sin(beta)/l_r", "a"],
+                damped: &[(3, 0)],
+                heads: true,
+            },
+        }
+    }
+
     /// The states, in order.
     pub fn states(self) -> &'static [Signal] {
-        match self {
-            Self::PointMass => PointMass::STATES,
-            Self::Unicycle => Unicycle::STATES,
-            Self::Bicycle => Bicycle::STATES,
-            Self::BicycleSmallSlip => SmallSlipBicycle::STATES,
-            Self::BicycleSmallSlipRate => SmallSlipBicycleWithRate::STATES,
-            Self::BicycleKinematic => KinematicBicycle::STATES,
-            Self::BicycleKinematicAngle | Self::BicycleKinematicSlip => SteeredBicycle::STATES,
-        }
+        self.facts().states
     }
 
     /// The inputs, in order.
     pub fn inputs(self) -> &'static [Signal] {
-        match self {
-            Self::PointMass => PointMass::INPUTS,
-            Self::Unicycle => Unicycle::INPUTS,
-            Self::Bicycle => Bicycle::INPUTS,
-            Self::BicycleSmallSlip => SmallSlipBicycle::INPUTS,
-            Self::BicycleSmallSlipRate => SmallSlipBicycleWithRate::INPUTS,
-            Self::BicycleKinematic => KinematicBicycle::INPUTS,
-            Self::BicycleKinematicAngle => Steering::Angle.inputs(),
-            Self::BicycleKinematicSlip => Steering::SlipAngle.inputs(),
-        }
+        self.facts().inputs
     }
 
     /// A description, for a human.
     pub fn title(self) -> &'static str {
-        match self {
-            Self::PointMass => "point mass in the plane",
-            Self::Unicycle => "unicycle",
-            Self::Bicycle => "kinematic bicycle (simplified)",
-            Self::BicycleSmallSlip => "bicycle with small slip angle",
-            Self::BicycleSmallSlipRate => "bicycle with small slip angle, steered by its rate",
-            Self::BicycleKinematic => "kinematic bicycle, steered by the rate of its front wheel",
-            Self::BicycleKinematicAngle => "kinematic bicycle, steered by the angle of its front wheel",
-            Self::BicycleKinematicSlip => "kinematic bicycle, steered by its slip angle",
-        }
-    }
-
-    fn has_l_r(self) -> bool {
-        !matches!(self, Self::PointMass | Self::Unicycle)
-    }
-
-    fn has_l_f(self) -> bool {
-        matches!(self, Self::BicycleKinematic | Self::BicycleKinematicAngle)
+        self.facts().title
     }
 
     /// Whether it is affine in its inputs, as the model of a filter has to be.
     pub fn is_affine(self) -> bool {
-        !matches!(self, Self::BicycleKinematicAngle | Self::BicycleKinematicSlip)
+        self.facts().is_affine
+    }
+
+    /// The states that a damping controller damps, each with the input that acts against it, by their positions.
+    pub(super) fn damped(self) -> &'static [(usize, usize)] {
+        self.facts().damped
+    }
+
+    /// Whether there are controllers that head for a goal and along waypoints.
+    pub(super) fn heads(self) -> bool {
+        self.facts().heads
+    }
+
+    fn has_l_r(self) -> bool {
+        self.facts().constants[0]
+    }
+
+    fn has_l_f(self) -> bool {
+        self.facts().constants[1]
     }
 }
 
@@ -185,37 +293,7 @@ impl ReferenceSection {
 
     /// The plant as expressions for the derivatives of its states, for barriers that are expressions.
     pub(super) fn derivatives(self) -> &'static [&'static str] {
-        match self.model {
-            ModelName::PointMass => &["v_x", "v_y", "u_x", "u_y"],
-            ModelName::Unicycle => &["v*cos(theta)", "v*sin(theta)", "omega", "a"],
-            ModelName::Bicycle => &["v*cos(theta)", "v*sin(theta)", "v*beta/l_r", "a"],
-            ModelName::BicycleSmallSlip => {
-                &["v*cos(theta) - v*sin(theta)*beta", "v*sin(theta) + v*cos(theta)*beta", "v*beta/l_r", "a"]
-            }
-            ModelName::BicycleSmallSlipRate => &[
-                "v*cos(theta) - v*sin(theta)*beta",
-                "v*sin(theta) + v*cos(theta)*beta",
-                "v*beta/l_r",
-                "a",
-                "beta_rate",
-            ],
-            ModelName::BicycleKinematic => &[
-                "v*cos(theta + atan(tan(delta)*(l_r/(l_f + l_r))))",
-                "v*sin(theta + atan(tan(delta)*(l_r/(l_f + l_r))))",
-                "v*sin(atan(tan(delta)*(l_r/(l_f + l_r))))/l_r",
-                "a",
-                "delta_rate",
-            ],
-            ModelName::BicycleKinematicAngle => &[
-                "v*cos(theta + atan(tan(delta)*(l_r/(l_f + l_r))))",
-                "v*sin(theta + atan(tan(delta)*(l_r/(l_f + l_r))))",
-                "v*sin(atan(tan(delta)*(l_r/(l_f + l_r))))/l_r",
-                "a",
-            ],
-            ModelName::BicycleKinematicSlip => {
-                &["v*cos(theta + beta)", "v*sin(theta + beta)", "v*sin(beta)/l_r", "a"]
-            }
-        }
+        self.model.facts().derivatives
     }
 
     /// The bicycle of this section.
