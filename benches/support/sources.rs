@@ -61,7 +61,7 @@ pub(crate) fn plugged(model: usize) -> FilterBuilder {
 
 /// The goal with derivatives that are handed over.
 pub(crate) fn given() -> FilterBuilder {
-    filter(5, external(2, 2).expect("in range"))
+    filter(5, external(2, 2, 0).expect("in range"))
 }
 
 /// Derivatives handed over to [`given`] at the state `x` of a model.

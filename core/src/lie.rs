@@ -17,9 +17,9 @@
 
 pub(crate) mod ahead;
 pub(crate) mod degree;
-mod embedded;
 pub(crate) mod enclosure;
 mod external;
+mod place;
 mod source;
 
 use ahead::SUBSTEPS;
@@ -32,7 +32,7 @@ use core::array::from_fn;
 use core::marker::PhantomData;
 
 use crate::barrier::Barrier;
-use crate::dynamics::{ControlAffine, first};
+use crate::dynamics::{ControlAffine, WithPoint, first};
 use crate::error::{Error, ErrorKind};
 use crate::interval::Interval;
 use crate::jet::{Dual, Response, Taylor};
@@ -41,8 +41,8 @@ use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
 pub use crate::error::RelativeDegree;
 pub use degree::{detected, relative_degree};
-pub use embedded::embedded;
 pub use external::external;
+use place::Place;
 pub(crate) use source::FEW_ORDERS;
 pub use source::{
     DerivativeSource, Direction, Directional, EXPANSION_ORDERS, Expansion, ExpansionOver, PlantId, Predict,
@@ -134,6 +134,7 @@ impl Derivatives {
 struct Along<P, B, const NX: usize, const NU: usize, const K: usize, const N: usize> {
     plant: Arc<P>,
     barrier: B,
+    place: Place,
     dims: PhantomData<([(); NX], [(); NU])>,
 }
 
@@ -172,7 +173,7 @@ where
     }
 
     fn state_dim(&self) -> usize {
-        NX
+        self.place.components(NX)
     }
 
     fn input_dim(&self) -> usize {
@@ -180,7 +181,7 @@ where
     }
 
     fn evaluate(&self, t: f64, x: &[f64], out: &mut Derivatives) {
-        Self::write(&barrier_series(&*self.plant, &self.barrier, t, &first(x)), out);
+        Self::write(&barrier_series(&*self.plant, &self.barrier, t, &self.place.take(x)), out);
     }
 
     fn predict(&self) -> Option<&dyn Predict> {
@@ -200,7 +201,7 @@ where
     }
 
     fn highest(&self, t: f64, x: &[f64], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<f64> {
-        let region = self.plant.region(&first(x), bounds, time)?;
+        let region = self.plant.region(&self.place.take(x), bounds, time)?;
         self.barrier.highest(time.map(|after| t + after), &region)
     }
 }
@@ -212,18 +213,18 @@ where
     B: Barrier<NX>,
 {
     fn flow(&self, x: &mut [f64], u: &[f64], duration: f64) {
-        let (from, held) = (first::<f64, NX>(x), first(u));
-        x.copy_from_slice(&flow(&*self.plant, &from, &held, duration, SUBSTEPS));
+        let (from, held) = (self.place.take::<_, NX>(x), first(u));
+        self.place.put(&flow(&*self.plant, &from, &held, duration, SUBSTEPS), x);
     }
 
     fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
         *out = Ahead::ZERO;
-        let motion = ahead::motion::<P, NX, NU, K>(&*self.plant, x, u, duration);
+        let motion = ahead::motion::<P, NX, NU, K>(&*self.plant, &self.place.take(x), u, duration);
         ahead::evaluate(&self.barrier, t + duration, &motion, out);
     }
 
     fn ahead_of_row(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
-        let motion = ahead::motion::<P, NX, NU, N>(&*self.plant, x, u, duration);
+        let motion = ahead::motion::<P, NX, NU, N>(&*self.plant, &self.place.take(x), u, duration);
         ahead::evaluate(&self.barrier, t + duration, &motion, out);
     }
 
@@ -235,7 +236,13 @@ where
         duration: f64,
         out: &mut [f64; MAX_RELATIVE_DEGREE + 1],
     ) {
-        ahead::values::<P, B, NX, NU, K>((&*self.plant, &self.barrier), (t, duration), x, u, out);
+        ahead::values::<P, B, NX, NU, K>(
+            (&*self.plant, &self.barrier),
+            (t, duration),
+            &self.place.take(x),
+            u,
+            out,
+        );
     }
 
     fn values_of_row(
@@ -246,42 +253,63 @@ where
         duration: f64,
         out: &mut [f64; MAX_RELATIVE_DEGREE + 1],
     ) {
-        ahead::values::<P, B, NX, NU, N>((&*self.plant, &self.barrier), (t, duration), x, u, out);
+        ahead::values::<P, B, NX, NU, N>(
+            (&*self.plant, &self.barrier),
+            (t, duration),
+            &self.place.take(x),
+            u,
+            out,
+        );
     }
 
     fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]) {
-        let (x, u) = (first::<f64, NX>(x), first(u));
-        out.copy_from_slice(&self.plant.derivative(&x, &u));
+        let rate = self.plant.derivative(&self.place.take(x), &first(u));
+        out.fill(0.0);
+        self.place.put(&rate, out);
     }
 
     fn path(&self, x: &[f64], u: &[f64], out: &mut [Expansion]) {
-        let x = first::<f64, NX>(x);
-        ahead::path::<P, NX, NU>(&*self.plant, &x, u, out);
+        for (out, x) in out.iter_mut().zip(x) {
+            *out = [0.0; EXPANSION_ORDERS];
+            out[0] = *x;
+        }
+        self.place.put(&ahead::path::<P, NX, NU>(&*self.plant, &self.place.take(x), u), out);
     }
 
     fn value(&self, t: f64, x: &[f64]) -> f64 {
-        self.barrier.value(t, &first(x))
+        self.barrier.value(t, &self.place.take(x))
     }
 
     fn value_along(&self, t: f64, path: &[Expansion], out: &mut Expansion) {
-        *out = ahead::value_along::<B, NX>(&self.barrier, t, path);
+        *out = self.place.read::<_, _, NX>(path, |path| ahead::value_along::<B, NX>(&self.barrier, t, path));
     }
 
     fn rates_over(&self, path: &[ExpansionOver], u: &[f64], orders: usize, out: &mut [RateOver]) -> bool {
-        if orders <= FEW_ORDERS {
-            ahead::rates_over::<P, NX, NU, FEW_ORDERS>(&*self.plant, path, u, out);
+        /// The rates of a component that does not move.
+        const STILL: RateOver = [Interval { low: 0.0, high: 0.0 }; EXPANSION_ORDERS - 1];
+        let plant = &*self.plant;
+        let write = |path: &[ExpansionOver], out: &mut [RateOver]| match orders <= FEW_ORDERS {
+            true => ahead::rates_over::<P, NX, NU, FEW_ORDERS>(plant, path, u, out),
+            false => ahead::rates_over::<P, NX, NU, { EXPANSION_ORDERS - 1 }>(plant, path, u, out),
+        };
+        if self.place == Place::START {
+            write(path, &mut out[..NX]);
+            out[NX..].fill(STILL);
         } else {
-            ahead::rates_over::<P, NX, NU, { EXPANSION_ORDERS - 1 }>(&*self.plant, path, u, out);
+            let mut own = [STILL; NX];
+            write(&self.place.take::<_, NX>(path), &mut own);
+            out.fill(STILL);
+            self.place.put(&own, out);
         }
         true
     }
 
     fn value_over(&self, time: Interval, path: &[ExpansionOver]) -> Option<Interval> {
-        Some(ahead::value_over::<B, NX>(&self.barrier, time, path))
+        Some(self.place.read::<_, _, NX>(path, |path| ahead::value_over::<B, NX>(&self.barrier, time, path)))
     }
 
     fn last_over(&self, time: Interval, path: &[ExpansionOver]) -> Option<Interval> {
-        Some(ahead::last_over::<B, NX>(&self.barrier, time, path))
+        Some(self.place.read::<_, _, NX>(path, |path| ahead::last_over::<B, NX>(&self.barrier, time, path)))
     }
 
     fn lowest_held(&self, t: f64, x: &[f64], u: &[f64], duration: f64, wanted: f64) -> Option<f64> {
@@ -290,17 +318,23 @@ where
             return None;
         }
         let model = (&*self.plant, &self.barrier);
-        Some(ahead::lowest_held::<P, B, NX, NU>(model, (t, duration), x, u, wanted))
+        Some(ahead::lowest_held::<P, B, NX, NU>(
+            model,
+            (t, duration),
+            &self.place.take::<_, NX>(x),
+            u,
+            wanted,
+        ))
     }
 
     fn is_still(&self, x: &[f64]) -> Option<bool> {
-        let x = from_fn(|i| Interval::from(x[i]));
+        let x = self.place.take::<_, NX>(x).map(Interval::from);
         // If time is not used, the bits are the same.
         Some(self.barrier.value(Interval::ALL, &x) == self.barrier.value(Interval::from(0.0), &x))
     }
 
     fn lowest_from(&self, t: f64, x: &[f64]) -> Option<f64> {
-        self.barrier.range_from(t, &first(x)).map(|[least, _]| least)
+        self.barrier.range_from(t, &self.place.take(x)).map(|[least, _]| least)
     }
 }
 
@@ -321,7 +355,7 @@ where
     }
 
     fn motion(&self, x: &[f64], room: &mut dyn Any) {
-        *room.downcast_mut().expect(ROOM) = motion::<P, NX, NU, K>(&*self.plant, &first(x));
+        *room.downcast_mut().expect(ROOM) = motion::<P, NX, NU, K>(&*self.plant, &self.place.take(x));
     }
 
     fn evaluate_along(&self, t: f64, motion: &dyn Any, out: &mut Derivatives) {
@@ -330,7 +364,8 @@ where
     }
 
     fn motion_ahead(&self, x: &[f64], u: &[f64], duration: f64, room: &mut dyn Any) {
-        *room.downcast_mut().expect(ROOM) = ahead::motion::<P, NX, NU, N>(&*self.plant, x, u, duration);
+        *room.downcast_mut().expect(ROOM) =
+            ahead::motion::<P, NX, NU, N>(&*self.plant, &self.place.take(x), u, duration);
     }
 
     fn ahead_of_row_along(&self, t: f64, motion: &dyn Any, out: &mut Ahead) {
@@ -360,7 +395,10 @@ where
     B: Barrier<NX>,
 {
     fn flow_directional(&self, x: &mut [f64], dx: &mut [f64], u: &[f64], duration: f64) {
-        ahead::flow_directional::<P, NX, NU>(&*self.plant, x, dx, u, duration);
+        let [mut own, mut own_dx] = [&*x, &*dx].map(|all| self.place.take::<_, NX>(all));
+        ahead::flow_directional::<P, NX, NU>(&*self.plant, &mut own, &mut own_dx, u, duration);
+        self.place.put(&own, x);
+        self.place.put(&own_dx, dx);
     }
 
     fn ahead_directional(
@@ -373,7 +411,9 @@ where
         out: &mut Ahead,
     ) {
         let model = (&*self.plant, &self.barrier);
-        ahead::differentiate::<P, B, NX, NU, K>(model, (t, duration), x, u, direction, out);
+        let [x, dx] = [x, direction.x].map(|all| self.place.take::<_, NX>(all));
+        let direction = Direction { x: &dx, ..direction };
+        ahead::differentiate::<P, B, NX, NU, K>(model, (t, duration), &x, u, direction, out);
     }
 }
 
@@ -397,13 +437,46 @@ where
     P: ControlAffine<NX, NU> + Send + Sync + 'static,
     B: Barrier<NX> + Send + 'static,
 {
+    placed(plant, barrier, n, Place::START)
+}
+
+/// The same for a barrier that follows a measured point: along a plant beside a point, whose position and velocity are the
+/// four components of the filter's x from `first` on. The other states are its first components. So several barriers of a
+/// filter can each follow a point of their own.
+///
+/// # Errors
+///
+/// As for [`along`].
+pub fn following<P, B, const NX: usize, const EXTENDED: usize, const NU: usize>(
+    plant: Arc<WithPoint<P, NX>>,
+    barrier: B,
+    n: usize,
+    first: usize,
+) -> Result<Box<dyn DerivativeSource>, Error>
+where
+    P: ControlAffine<NX, NU> + Send + Sync + 'static,
+    B: Barrier<EXTENDED> + Send + 'static,
+{
+    placed::<_, _, EXTENDED, NU>(plant, barrier, n, Place::new(NX, first))
+}
+
+fn placed<P, B, const NX: usize, const NU: usize>(
+    plant: Arc<P>,
+    barrier: B,
+    n: usize,
+    place: Place,
+) -> Result<Box<dyn DerivativeSource>, Error>
+where
+    P: ControlAffine<NX, NU> + Send + Sync + 'static,
+    B: Barrier<NX> + Send + 'static,
+{
     checked_inputs(NU)?;
     macro_rules! by_degree {
         ($($n:literal => $k:literal),*) => {
             match n {
                 // A constant condition: impossible degrees are not compiled.
                 $($n if const { $n <= P::LARGEST_DEGREE } => {
-                    Ok(Box::new(Along::<P, B, NX, NU, $k, $n> { plant, barrier, dims: PhantomData }) as _)
+                    Ok(Box::new(Along::<P, B, NX, NU, $k, $n> { plant, barrier, place, dims: PhantomData }) as _)
                 })*
                 _ => Err(no_degree(n, P::LARGEST_DEGREE.min(MAX_RELATIVE_DEGREE))),
             }

@@ -27,9 +27,10 @@ fn sources() -> [Box<dyn DerivativeSource>; 2] {
 
 fn filter(sources: [Box<dyn DerivativeSource>; 2]) -> Filter {
     let settings = BarrierSettings::within(DEADLINE).margin(0.1);
-    let dim = sources[0].state_dim();
+    let dims = sources.each_ref().map(|source| source.state_dim());
     let [goal, speed] = sources;
-    Filter::from_sources(dim, INPUTS)
+    Filter::from_sources(dims[0], INPUTS)
+        .measured(dims[1] - dims[0])
         .source("goal", goal, settings)
         .and_then(|b| b.source("speed", speed, settings))
         .and_then(|b| b.bounds(&[-30.0; INPUTS], &[30.0; INPUTS]))
@@ -40,11 +41,8 @@ fn filter(sources: [Box<dyn DerivativeSource>; 2]) -> Filter {
 
 /// The filter whose state is the stacks of both barriers.
 fn external() -> Filter {
-    let picked = |n: usize, first: usize| {
-        let picks: Vec<usize> = (first..first + n + 1 + INPUTS).collect();
-        lie::embedded(lie::external(n, INPUTS).expect("in range"), 9, &picks).expect("valid picks")
-    };
-    filter([picked(2, 0), picked(1, 5)])
+    let given = |n: usize, first: usize| lie::external(n, INPUTS, first).expect("in range");
+    filter([given(2, 0), given(1, 5)])
 }
 
 /// The stacks at `x`.
@@ -122,7 +120,7 @@ fn the_same_bits_in_a_closed_loop_and_the_same_derivative() {
 fn without_a_prediction_a_step_is_pointwise_and_a_delay_refused() {
     let settings = BarrierSettings::within(DEADLINE).margin(0.1);
     let builder = || {
-        let source = lie::external(1, 1).expect("in range");
+        let source = lie::external(1, 1, 0).expect("in range");
         Filter::from_sources(3, 1).source("h", source, settings).expect("valid settings")
     };
     let mut filter = builder().sampling(Sampling::Period(0.1)).and_then(|b| b.build()).expect("a filter");

@@ -163,7 +163,7 @@ fn what_is_refused() {
     );
     // h and the two parts of its row.
     let done = Filter::from_sources(4, 2)
-        .source("goal", lie::external(1, 2).expect("in range"), settings())
+        .source("goal", lie::external(1, 2, 0).expect("in range"), settings())
         .and_then(|b| b.measurement_errors(&errors))
         .and_then(FilterBuilder::build);
     refused("goal.measurement_errors: the barrier's source gives no derivatives along a direction", done);

@@ -406,7 +406,7 @@ impl<E: Equations, const M: usize> DerivativeSource for Source<E, M> {
 
     fn evaluate(&self, t: f64, x: &[f64], out: &mut Derivatives) {
         let along = &mut self.work.borrow_mut().along;
-        along.evaluate(t, x);
+        along.evaluate(t, &x[..self.states]);
         *out = Derivatives::ZERO;
         for k in 0..=self.n {
             let Dual { value, gradient } = along.derivative(k);
@@ -451,7 +451,7 @@ impl<E: Equations, const M: usize> SharedPlant for Source<E, M> {
 
     fn motion(&self, x: &[f64], room: &mut dyn Any) {
         let begin: &mut Vec<f64> = room.downcast_mut().expect(FOREIGN_ROOM);
-        begin.copy_from_slice(x);
+        begin.copy_from_slice(&x[..self.states]);
     }
 
     fn evaluate_along(&self, t: f64, motion: &dyn Any, out: &mut Derivatives) {
@@ -462,7 +462,7 @@ impl<E: Equations, const M: usize> SharedPlant for Source<E, M> {
     fn motion_ahead(&self, x: &[f64], u: &[f64], duration: f64, room: &mut dyn Any) {
         let arrival: &mut Vec<Dual<M>> = room.downcast_mut().expect(FOREIGN_ROOM);
         let along = &mut self.work.borrow_mut().along;
-        along.arrive(x, u, duration);
+        along.arrive(&x[..self.states], u, duration);
         for (register, value) in arrival.iter_mut().enumerate() {
             *value = along.flow.series.get(register, 0);
         }
@@ -482,27 +482,34 @@ const FOREIGN_ROOM: &str = "a room made by a source along the same plant";
 
 impl<E: Equations, const M: usize> Predict for Source<E, M> {
     fn flow(&self, x: &mut [f64], u: &[f64], duration: f64) {
-        moved(&mut self.work.borrow_mut().flow, x, u, duration, SUBSTEPS);
+        moved(&mut self.work.borrow_mut().flow, &mut x[..self.states], u, duration, SUBSTEPS);
     }
 
     fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
         let along = &mut self.work.borrow_mut().along;
-        along.arrive(x, u, duration);
+        along.arrive(&x[..self.states], u, duration);
         along.continue_from_flow(t + duration);
         self.write(out, |k| along.derivative(k));
     }
 
     fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]) {
-        rates_at(&mut self.work.borrow_mut().expansions.flow, x, u, out);
+        let (own, others) = out.split_at_mut(self.states);
+        rates_at(&mut self.work.borrow_mut().expansions.flow, &x[..self.states], u, own);
+        others.fill(0.0);
     }
 
     fn path(&self, x: &[f64], u: &[f64], out: &mut [Expansion]) {
         let expansions = &mut self.work.borrow_mut().expansions;
-        expansions.flow.set_state(x.iter().copied());
+        expansions.flow.set_state(x[..self.states].iter().copied());
         expansions.flow.hold(u.iter().copied());
         expansions.continue_from_flow(0.0);
-        for (i, out) in out.iter_mut().enumerate() {
+        let (own, others) = out.split_at_mut(self.states);
+        for (i, out) in own.iter_mut().enumerate() {
             *out = std::array::from_fn(|k| expansions.series.get(i, k));
+        }
+        for (out, x) in others.iter_mut().zip(&x[self.states..]) {
+            *out = [0.0; EXPANSION_ORDERS];
+            out[0] = *x;
         }
     }
 
@@ -519,6 +526,8 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
 
     fn rates_over(&self, path: &[ExpansionOver], u: &[f64], orders: usize, out: &mut [RateOver]) -> bool {
         let Along { equations, series, .. } = &mut self.work.borrow_mut().expansions_over;
+        let (path, (out, others)) = (&path[..self.states], out.split_at_mut(self.states));
+        others.fill([Interval::from(0.0); EXPANSION_ORDERS - 1]);
         for (register, &value) in (path.len()..).zip(u) {
             series.set(register, 0, Interval::from(value));
         }
@@ -550,6 +559,7 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
 
     fn lowest_held(&self, t: f64, x: &[f64], u: &[f64], duration: f64, wanted: f64) -> Option<f64> {
         let Work { value, few_over, held, rate, .. } = &mut *self.work.borrow_mut();
+        let x = &x[..self.states];
         rates_at(&mut value.flow, x, u, rate);
         let Along { equations, series, .. } = few_over;
         for (register, &value) in (x.len()..).zip(u) {
@@ -597,6 +607,7 @@ impl<E: Equations, const M: usize> Directional for Source<E, M> {
 impl<E: Equations, const M: usize> PredictDirectional for Source<E, M> {
     fn flow_directional(&self, x: &mut [f64], dx: &mut [f64], u: &[f64], duration: f64) {
         let flow = &mut self.work.borrow_mut().flow_tangent;
+        let (x, dx) = (&mut x[..self.states], &mut dx[..self.states]);
         flow.set_state(x.iter().zip(&*dx).map(|(&value, &directional)| Tangent { value, directional }));
         flow.hold(u.iter().map(|&value| Tangent { value, directional: 0.0 }));
         flow.run(duration, SUBSTEPS);
@@ -615,7 +626,7 @@ impl<E: Equations, const M: usize> PredictDirectional for Source<E, M> {
         out: &mut Ahead,
     ) {
         let along = &mut self.work.borrow_mut().along_tangent;
-        let state = x.iter().zip(direction.x);
+        let state = x[..self.states].iter().zip(direction.x);
         along
             .flow
             .set_state(state.map(|(&v, &d)| Tangent { value: Dual::from(v), directional: Dual::from(d) }));

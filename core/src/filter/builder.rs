@@ -30,7 +30,9 @@ pub struct FilterBuilder<P = (), const NX: usize = 0, const NU: usize = 0> {
 
 /// What a builder collects, whatever the plant.
 struct Parts {
+    /// Number of states of the plant, of measured quantities after them in x, and of inputs.
     state_dim: usize,
+    measured: usize,
     input_dim: usize,
     slots: Vec<BarrierSlot>,
     bounds: Bounds,
@@ -51,6 +53,7 @@ impl<P, const NX: usize, const NU: usize> FilterBuilder<P, NX, NU> {
     pub(super) fn new(plant: P, [state_dim, input_dim]: [usize; 2]) -> Self {
         let parts = Parts {
             state_dim,
+            measured: 0,
             input_dim,
             slots: Vec::new(),
             bounds: Bounds::NONE,
@@ -150,6 +153,31 @@ impl<P, const NX: usize, const NU: usize> FilterBuilder<P, NX, NU> {
     ) -> Result<Self, Error> {
         self.parts.add(name, source, settings)?;
         Ok(self)
+    }
+
+    /// Appends `count` numbers to x, after the states of the plant: quantities that only some barriers depend on, such as the
+    /// position and velocity of a point that one [follows](lie::following), or derivatives from
+    /// [elsewhere](lie::external()). Default: 0.
+    ///
+    /// ```
+    /// use std::sync::Arc;
+    ///
+    /// # use punctual_core::{barriers::{DistanceDisc, Outside}, dynamics::WithPoint, filter::*, lie};
+    /// # use punctual_core::plants::Unicycle;
+    /// // x = (x_p, y_p, θ, v, p_x, p_y, v_x, v_y): a goal, and a vehicle at p to keep away from.
+    /// let clear = Outside(DistanceDisc::new([0.0, 0.0], 2.0, 2.0)?.following(4));
+    /// let beside = Arc::new(WithPoint::<_, 4>(Unicycle));
+    /// let filter = Filter::builder(Unicycle)
+    ///     .measured(4)
+    ///     .barrier("goal", DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
+    ///     .source("clear", lie::following::<_, _, 4, 8, 2>(beside, clear, 2, 4)?, BarrierSettings::keeping())?
+    ///     .build()?;
+    /// # Ok::<(), punctual_core::Error>(())
+    /// ```
+    #[must_use]
+    pub fn measured(mut self, count: usize) -> Self {
+        self.parts.measured = count;
+        self
     }
 
     /// Makes the last barrier added follow a custom profile ([`FixedTime::with_profile`]).
@@ -357,7 +385,7 @@ impl<P, const NX: usize, const NU: usize> FilterBuilder<P, NX, NU> {
     ///
     /// A slice of the wrong length, an error that is not finite or < 0.
     pub fn measurement_errors(mut self, errors: &[f64]) -> Result<Self, Error> {
-        length("measurement_errors", errors.len(), self.parts.state_dim)?;
+        length("measurement_errors", errors.len(), self.parts.state_dim + self.parts.measured)?;
         for (i, &error) in errors.iter().enumerate() {
             non_negative(&format!("measurement_errors[{}]", i + 1), error)?;
         }
@@ -378,6 +406,21 @@ impl<P, const NX: usize, const NU: usize> FilterBuilder<P, NX, NU> {
     }
 }
 
+/// Checks that a source is along a plant of `states` and `inputs`, and depends on no more than the quantities measured
+/// beside them.
+///
+/// # Errors
+///
+/// Other dimensions.
+pub(super) fn check_dims(
+    source: &dyn DerivativeSource,
+    [states, measured, inputs]: [usize; 3],
+) -> Result<(), Error> {
+    let needed = source.state_dim();
+    length("x", needed, if needed > states { needed.min(states + measured) } else { states })?;
+    length("u", source.input_dim(), inputs)
+}
+
 impl Parts {
     fn add(
         &mut self,
@@ -385,8 +428,7 @@ impl Parts {
         source: Box<dyn DerivativeSource>,
         settings: BarrierSettings,
     ) -> Result<(), Error> {
-        length("x", source.state_dim(), self.state_dim).map_err(|e| e.within(name))?;
-        length("u", source.input_dim(), self.input_dim).map_err(|e| e.within(name))?;
+        check_dims(&*source, [self.state_dim, self.measured, self.input_dim]).map_err(|e| e.within(name))?;
         let promise = FixedTime::new(source.relative_degree(), settings).map_err(|e| e.within(name))?;
         self.slots.push(BarrierSlot::new(name, source, promise));
         Ok(())
@@ -436,7 +478,8 @@ impl Parts {
 
     fn build(self) -> Result<Filter, Error> {
         let Self {
-            state_dim,
+            state_dim: states,
+            measured,
             input_dim,
             mut slots,
             bounds,
@@ -447,6 +490,7 @@ impl Parts {
             delay,
             errors,
         } = self;
+        let state_dim = states + measured;
         // Dimensions.
         let dimension = |field, message| Err(Error::new(ErrorKind::Dimension, field, message));
         if slots.is_empty() {
@@ -483,6 +527,7 @@ impl Parts {
             rows::check_all_errors(&mut slots, sampling, delay)?;
         }
         for slot in &mut slots {
+            slot.now.from = vec![0.0; state_dim];
             slot.now.slopes = vec![[0.0; MAX_RELATIVE_DEGREE]; errors.count()];
         }
         // State and workspace, allocated once: a step does not allocate.
@@ -502,6 +547,7 @@ impl Parts {
         let first_period = sampling.first(deadlines.fold(f64::INFINITY, f64::min));
         let rows = Rows {
             state_dim,
+            measured,
             input_dim,
             slots,
             bounded: bounds != Bounds::NONE,

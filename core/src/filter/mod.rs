@@ -452,15 +452,15 @@ impl Filter {
     ///
     /// No such barrier; a source of other dimensions or another relative degree; a filter with plans.
     pub fn set_source(&mut self, index: usize, source: Box<dyn DerivativeSource>) -> Result<(), Error> {
-        let dims = (self.rows.state_dim, self.rows.input_dim);
+        let Rows { state_dim, measured, input_dim, .. } = self.rows;
+        let dims = [state_dim - measured, measured, input_dim];
         let exact = self.rows.errors.is_exact();
         let slot = self.replaced("source", index)?;
         let named = |e: Error| e.within(&slot.name);
         if !exact {
             rows::check_errors(&*source).map_err(named)?;
         }
-        length("x", source.state_dim(), dims.0).map_err(named)?;
-        length("u", source.input_dim(), dims.1).map_err(named)?;
+        builder::check_dims(&*source, dims).map_err(named)?;
         let (found, wanted) = (source.relative_degree(), slot.source.relative_degree());
         if found != wanted {
             let message = format!("is {found}, must stay {wanted}");

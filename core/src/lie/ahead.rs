@@ -297,15 +297,15 @@ where
     series
 }
 
-/// Writes the expansions of the states from `x` under the held input `u`: `J x_J = [f(x)]_{J−1} + [g(x)]_{J−1} u`. Compiled
+/// The expansions of the states from `x` under the held input `u`: `J x_J = [f(x)]_{J−1} + [g(x)]_{J−1} u`. Compiled
 /// once per plant, whatever the barriers, since it is much code.
 #[inline(never)]
 pub(super) fn path<P, const NX: usize, const NU: usize>(
     plant: &P,
     x: &[f64; NX],
     u: &[f64],
-    out: &mut [Expansion],
-) where
+) -> [Expansion; NX]
+where
     P: ControlAffine<NX, NU>,
 {
     let mut path = from_fn::<Taylor<f64, EXPANSION_ORDERS>, NX, _>(|i| Taylor::constant(x[i]));
@@ -326,9 +326,7 @@ pub(super) fn path<P, const NX: usize, const NU: usize>(
         }};
     }
     extend_to!(1, 2, 3, 4, 5, 6, 7, 8, 9);
-    for (out, state) in out.iter_mut().zip(&path) {
-        *out = state.coefficients;
-    }
+    path.map(|state| state.coefficients)
 }
 
 /// The expansion of `barrier` along `path`, starting at `t`. Compiled once per barrier, whatever the plants and degrees.
@@ -401,7 +399,7 @@ fn time_over<const K: usize>(time: Interval) -> Taylor<Interval, K> {
 pub(super) fn lowest_held<P, B, const NX: usize, const NU: usize>(
     (plant, barrier): (&P, &B),
     (t, dt): (f64, f64),
-    x: &[f64],
+    x: &[f64; NX],
     u: &[f64],
     wanted: f64,
 ) -> f64
@@ -409,9 +407,9 @@ where
     P: ControlAffine<NX, NU>,
     B: Barrier<NX>,
 {
-    let (x, u) = (first::<f64, NX>(x), first::<f64, NU>(u));
+    let u = first::<f64, NU>(u);
     let mut states = [[Interval::ALL; 2]; NX];
-    let known = enclosure::enclose(&x, dt, &plant.derivative(&x, &u), &mut states, |states| {
+    let known = enclosure::enclose(x, dt, &plant.derivative(x, &u), &mut states, |states| {
         let over = from_fn::<_, NX, _>(|i| states[i][0]);
         let (f, g) = (plant.drift(&over), plant.input_map(&over));
         for (i, [_, rate]) in states.iter_mut().enumerate() {
@@ -429,14 +427,14 @@ where
     }
     let expansion = from_fn::<_, NX, _>(|i| Taylor { coefficients: states[i] });
     let slope = barrier.value(time_over::<2>(time), &expansion).coefficients[1];
-    enclosure::sharper(low, barrier.value(t, &x), slope, dt)
+    enclosure::sharper(low, barrier.value(t, x), slope, dt)
 }
 
 /// The series of the states from [`arrival`] under the held input `u`, `K` coefficients, with their derivatives along u.
 #[inline(always)]
 pub(super) fn motion<P, const NX: usize, const NU: usize, const K: usize>(
     plant: &P,
-    x: &[f64],
+    x: &[f64; NX],
     u: &[f64],
     duration: f64,
 ) -> [Taylor<Dual<NU>, K>; NX]
@@ -444,7 +442,7 @@ where
     P: ControlAffine<NX, NU>,
 {
     let held: [f64; NU] = from_fn(|i| u[i]);
-    let x = arrival(plant, &first(x), &held, duration);
+    let x = arrival(plant, x, &held, duration);
     series(plant, &x, &from_fn(|i| Dual::variable(held[i], i)))
 }
 
@@ -471,7 +469,7 @@ pub(super) fn evaluate<B, const NX: usize, const NU: usize, const K: usize>(
 pub(super) fn values<P, B, const NX: usize, const NU: usize, const K: usize>(
     (plant, barrier): (&P, &B),
     (t, duration): (f64, f64),
-    x: &[f64],
+    x: &[f64; NX],
     u: &[f64],
     out: &mut [f64],
 ) where
@@ -479,7 +477,7 @@ pub(super) fn values<P, B, const NX: usize, const NU: usize, const K: usize>(
     B: Barrier<NX>,
 {
     let u = first::<f64, NU>(u);
-    let x = arrival_alone(plant, &first(x), &u, duration);
+    let x = arrival_alone(plant, x, &u, duration);
     let h: Taylor<_, K> = barrier.value(Taylor::time(t + duration), &series(plant, &x, &u));
     for (k, out) in out[..K].iter_mut().enumerate() {
         *out = h.derivative(k);

@@ -10,6 +10,15 @@ use crate::error::Error;
 struct External {
     n: usize,
     inputs: usize,
+    /// The component of x at which they begin.
+    first: usize,
+}
+
+impl External {
+    /// The part of x that is its own.
+    fn own<'a>(&self, x: &'a [f64]) -> &'a [f64] {
+        &x[self.first..self.state_dim()]
+    }
 }
 
 impl DerivativeSource for External {
@@ -18,7 +27,7 @@ impl DerivativeSource for External {
     }
 
     fn state_dim(&self) -> usize {
-        self.n + 1 + self.inputs
+        self.first + self.n + 1 + self.inputs
     }
 
     fn input_dim(&self) -> usize {
@@ -26,7 +35,7 @@ impl DerivativeSource for External {
     }
 
     fn evaluate(&self, _t: f64, x: &[f64], out: &mut Derivatives) {
-        let (drift, row) = x.split_at(self.n + 1);
+        let (drift, row) = self.own(x).split_at(self.n + 1);
         *out = Derivatives::ZERO;
         out.drift[..=self.n].copy_from_slice(drift);
         out.row[..self.inputs].copy_from_slice(row);
@@ -40,11 +49,11 @@ impl DerivativeSource for External {
 impl Directional for External {
     /// h⁽ⁿ⁾ = L_f^n h + L_g L_f^(n−1) h u is bilinear, all else linear.
     fn evaluate_directional(&self, _t: f64, x: &[f64], u: &[f64], direction: Direction, out: &mut Ahead) {
-        let (drift, row) = direction.x.split_at(self.n + 1);
+        let (drift, row) = self.own(direction.x).split_at(self.n + 1);
         *out = Ahead::ZERO;
         out.value[..=self.n].copy_from_slice(drift);
         out.value[self.n] += dot(row, u);
-        out.value[self.n] += dot(&x[self.n + 1..], direction.u);
+        out.value[self.n] += dot(&self.own(x)[self.n + 1..], direction.u);
         out.gradient[self.n][..self.inputs].copy_from_slice(row);
     }
 }
@@ -56,7 +65,7 @@ impl Directional for External {
 ///
 /// They are used as they are: `n` is not checked. Nothing can be predicted, so steps are those of
 /// [`Sampling::Pointwise`](crate::filter::Sampling::Pointwise), and the margin has to cover held inputs. For several
-/// barriers the filter's state holds one such part after the other; [`embedded`](super::embedded()) picks each.
+/// barriers x holds one such part after the other, each from its component `first` on.
 ///
 /// # Errors
 ///
@@ -68,7 +77,7 @@ impl Directional for External {
 /// // h = 3 - p for p'' = u, at p = 5, p' = 2: h' = -2, and h'' = 0 - u.
 /// let settings = BarrierSettings::within(1.0).margin(0.01);
 /// let mut filter = Filter::from_sources(4, 1)
-///     .source("wall", lie::external(2, 1)?, settings)?
+///     .source("wall", lie::external(2, 1, 0)?, settings)?
 ///     .sampling(Sampling::Pointwise)?
 ///     .build()?;
 /// let mut u = [0.0];
@@ -77,9 +86,9 @@ impl Directional for External {
 /// assert!(u[0] < 0.0);
 /// # Ok::<(), punctual_core::Error>(())
 /// ```
-pub fn external(n: usize, input_dim: usize) -> Result<Box<dyn DerivativeSource>, Error> {
+pub fn external(n: usize, input_dim: usize, first: usize) -> Result<Box<dyn DerivativeSource>, Error> {
     let inputs = checked_inputs(input_dim)?;
-    Ok(Box::new(External { n: checked_degree(n)?, inputs }))
+    Ok(Box::new(External { n: checked_degree(n)?, inputs, first }))
 }
 
 #[cfg(test)]
@@ -94,7 +103,7 @@ mod tests {
 
     #[test]
     fn what_is_handed_over_comes_out() {
-        let source = external(2, 2).expect("in range");
+        let source = external(2, 2, 0).expect("in range");
         let mut out = Derivatives { lower_sensitivity: 1.0, ..Derivatives::ZERO };
         source.evaluate(7.0, &X, &mut out);
         assert_eq!((&out.drift[..4], &out.row[..3]), (&[3.0, -2.0, 0.5, 0.0][..], &[4.0, -1.5, 0.0][..]));
@@ -103,7 +112,7 @@ mod tests {
 
     #[test]
     fn nothing_is_foretold() {
-        let source = external(2, 2).expect("in range");
+        let source = external(2, 2, 0).expect("in range");
         assert!(source.predict().is_none() && source.predict_directional().is_none());
         assert!(source.highest(0.0, &X, [&[-1.0; 2], &[1.0; 2]], [0.0, 1.0]).is_none());
     }
@@ -111,7 +120,7 @@ mod tests {
     /// Central differences of a bilinear function are exact; the numbers are dyadic.
     #[test]
     fn the_change_along_a_direction() {
-        let source = external(2, 2).expect("in range");
+        let source = external(2, 2, 0).expect("in range");
         let (dx, u, du) = ([1.0, 0.5, -2.0, 0.25, 3.0], [1.0, 2.0], [-0.5, 4.0]);
         let at = |by: f64| {
             let x: [f64; 5] = core::array::from_fn(|i| X[i] + by * dx[i]);
@@ -136,11 +145,11 @@ mod tests {
 
     #[test]
     fn sizes_are_checked() {
-        let refused = |n, inputs| external(n, inputs).err().map(|e| e.to_string());
+        let refused = |n, inputs| external(n, inputs, 0).err().map(|e| e.to_string());
         assert_eq!(refused(0, 1).as_deref(), Some("relative_degree: is 0, must be 1 to 8"));
         assert_eq!(refused(9, 1).as_deref(), Some("relative_degree: is 9, must be 1 to 8"));
         assert_eq!(refused(1, 0).as_deref(), Some("u: has 0 components, must have 1 to 32"));
         assert_eq!(refused(1, 33).as_deref(), Some("u: has 33 components, must have 1 to 32"));
-        assert!(external(8, 12).is_ok());
+        assert!(external(8, 12, 0).is_ok());
     }
 }

@@ -207,17 +207,12 @@ impl Adding<'_> {
         P: ControlAffine<NX, 2> + Copy + Send + Sync + 'static,
         B: Barrier<NX> + Barrier<EXTENDED> + Send + 'static,
     {
-        let dim = NX + self.configuration.barrier_inputs().len();
         let source = if self.section().shape.followed().is_none() {
-            self.degree(lie::detected(&*plant, &barrier), || None)
-                .and_then(|n| lie::along(plant, barrier, n))
-                .and_then(|source| lie::embedded(source, dim, &std::array::from_fn::<_, NX, _>(|i| i)))
+            self.degree(lie::detected(&*plant, &barrier), || None).and_then(|n| lie::along(plant, barrier, n))
         } else {
             let (plant, first) = (Arc::new(WithPoint::<_, NX>(*plant)), self.first);
-            let picks = std::array::from_fn::<_, EXTENDED, _>(|i| if i < NX { i } else { first + i - NX });
             self.degree(lie::detected::<_, _, EXTENDED, 2>(&*plant, &barrier), || None)
-                .and_then(|n| lie::along::<_, _, EXTENDED, 2>(plant, barrier, n))
-                .and_then(|source| lie::embedded(source, dim, &picks))
+                .and_then(|n| lie::following::<_, _, NX, EXTENDED, 2>(plant, barrier, n, first))
         };
         self.source(source)
     }
@@ -249,11 +244,8 @@ impl Adding<'_> {
 
     /// Adds a barrier whose derivatives are the filter's states from [`Self::first`] on.
     pub(super) fn external(self, degree: usize) -> Result<FilterBuilder, ConfigurationError> {
-        let c = self.configuration;
-        let dim = c.plant.states().len() + c.barrier_inputs().len();
-        let own: Vec<usize> = (self.first..self.first + self.section().inputs(&c.plant).len()).collect();
-        let source = lie::external(degree, c.plant.inputs().len());
-        self.source(source.and_then(|source| lie::embedded(source, dim, &own)))
+        let source = lie::external(degree, self.configuration.plant.inputs().len(), self.first);
+        self.source(source)
     }
 
     /// Adds a barrier of the relative degree `found`, and `driven` with inputs; `source` makes its derivatives.
@@ -264,10 +256,8 @@ impl Adding<'_> {
         source: impl FnOnce(usize) -> Result<Box<dyn DerivativeSource>, punctual_models::Error>,
     ) -> Result<FilterBuilder, ConfigurationError> {
         let n = self.degree(found, || Some(driven())).map_err(|e| self.named(e))?;
-        let own: Vec<usize> = (0..self.configuration.plant.states().len()).collect();
-        let dim = own.len() + self.configuration.barrier_inputs().len();
         let source = source(n).map_err(|e| self.of_model(&e))?;
-        self.source(lie::embedded(source, dim, &own))
+        self.source(Ok(source))
     }
 
     fn source(

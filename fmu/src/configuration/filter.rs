@@ -541,7 +541,7 @@ impl FilterConfiguration {
         let states = self.plant.states().len();
         let mut next_point = states;
         let plant = Forms::default();
-        let mut builder = Filter::from_sources(states + self.barrier_inputs().len(), inputs.len());
+        let mut builder = Filter::from_sources(states, inputs.len()).measured(self.barrier_inputs().len());
         // The barriers, each with its window and its strictness.
         for (i, section) in self.barrier.iter().enumerate() {
             let first = next_point;

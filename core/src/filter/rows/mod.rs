@@ -49,7 +49,9 @@ pub(super) struct Workspace {
 /// One row per barrier, and the QP under them: `min ½‖u − u_ref‖²` within the input bounds. State and input are those of the
 /// model, in which an integrated input is a state.
 pub(super) struct Rows {
+    /// Number of components of x, and how many of them are measured quantities after the states of the plant.
     pub(super) state_dim: usize,
+    pub(super) measured: usize,
     pub(super) input_dim: usize,
     pub(super) slots: Vec<BarrierSlot>,
     pub(super) bounds: Bounds,

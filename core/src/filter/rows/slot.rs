@@ -107,10 +107,10 @@ pub(crate) struct SlotSample {
 }
 
 impl SlotSample {
-    fn new(states: usize) -> Self {
+    fn new() -> Self {
         Self {
             in_force: false,
-            from: vec![0.0; states],
+            from: Vec::new(),
             derivatives: Derivatives::ZERO,
             slopes: Vec::new(),
             shortfall: None,
@@ -132,7 +132,7 @@ impl SlotSample {
 impl BarrierSlot {
     pub(crate) fn new(name: &str, source: Box<dyn DerivativeSource>, promise: FixedTime) -> Self {
         let (begin, end, strictness) = (Begin::default(), End::default(), Strictness::default());
-        let now = SlotSample::new(source.state_dim());
+        let now = SlotSample::new();
         let name = name.to_owned();
         Self { name, source, plant: None, promise, begin, end, strictness, exact: true, now }
     }
