@@ -19,6 +19,18 @@
 //! # Ok::<(), punctual_core::Error>(())
 //! ```
 //!
+//! # What you need
+//!
+//! | for | use |
+//! |---|---|
+//! | the plant | [`ControlAffine`](dynamics::ControlAffine) over any [`Scalar`](scalar::Scalar), or a vehicle of [`plants`] |
+//! | the sets | [`Barrier`](barrier::Barrier), or a shape of [`barriers`] |
+//! | the filter | [`Filter`](filter::Filter), [`FilterBuilder`](filter::FilterBuilder), [`BarrierSettings`](filter::BarrierSettings); [`Begin`](filter::Begin), [`End`](filter::End), [`Strictness`](filter::Strictness), [`Sampling`](filter::Sampling); `Plans`, [`Integration`](filter::Integration) |
+//! | its answers | [`Report`](filter::Report), [`BarrierReport`](filter::BarrierReport), [`Status`](filter::Status), `Assurance`, `BackupPlan`; [`Error`] |
+//! | its memory | [`FilterState`](filter::FilterState) |
+//!
+//! The other types are for constraints, sources of derivatives and controllers of your own.
+//!
 //! # Notation
 //!
 //! | symbol | name in code | unit | shape |
