@@ -10,7 +10,7 @@ use crate::filter::integrator::{Integrator, insert};
 use crate::filter::rows::{BarrierSlot, Rows};
 use crate::filter::{Begin, End, Integration, Strictness};
 use crate::lie::Predict;
-use crate::plan::{BackupPlan, Failure, Integral, Limit, ON_TIME, Planner, Requirement, slopes};
+use crate::plan::{BackupPlan, Failure, Integral, Limit, Planner, Requirement, TOLERANCES, slopes};
 use crate::qp::Bounds;
 
 /// Margin of a plan, as a part of the size of h at the first sample: for what the model leaves out between two samples.
@@ -114,7 +114,7 @@ impl<'a> Planning<'a> {
             // Not the h of the report, which is missing if u_ref is NaN.
             let h = model.value(t, x);
             // Slightly earlier, so that round-off of a time leaves no gap.
-            let after = |seconds: f64| t + seconds - ON_TIME * self.plans.period;
+            let after = |seconds: f64| t + seconds - TOLERANCES.on_time * self.plans.period;
             let from = match (slot.begin, slot.promise.settings().deadline) {
                 (Begin::At(begin), _) if begin > 0.0 => after(begin),
                 // NaN is required at once, so that the check finds it.

@@ -11,7 +11,7 @@ use crate::convergence::FixedTimeState;
 use crate::filter::integrator::Integrator;
 use crate::filter::rows::{BarrierSlot, End, Rows, Workspace};
 use crate::filter::{Infeasible, Phase, Status};
-use crate::plan::{Failure, ON_TIME, Plan, Planner, SearchProgress, slopes};
+use crate::plan::{Failure, Plan, Planner, SearchProgress, TOLERANCES, slopes};
 use crate::qp::Bounds;
 use crate::scalar::all_finite;
 
@@ -237,7 +237,7 @@ impl Decision<'_> {
             let Promise { from, until, .. } = (*promise)?;
             let h = model.value(t, x);
             // A promise that begins at this sample is checked now.
-            let begins = t - 2.0 * ON_TIME * self.plans.period;
+            let begins = t - 2.0 * TOLERANCES.on_time * self.plans.period;
             match from <= t && t < until {
                 // NaN counts as outside.
                 true if h.is_nan() || h < 0.0 => Some(Failure::Broken { barrier, time: t, slack: h }),

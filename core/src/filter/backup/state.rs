@@ -6,7 +6,7 @@ use super::choice::ChoiceMemory;
 use super::deviation::Deviation;
 use super::{AssuranceStatus, JITTER};
 use crate::error::{Error, ErrorKind, length};
-use crate::plan::{BackupPlan, Failure, ON_TIME, Plan, SearchProgress};
+use crate::plan::{BackupPlan, Failure, Plan, SearchProgress, TOLERANCES};
 
 /// The largest round-off of a time, as a part of the period.
 const ROUND_OFF: f64 = 1e-2;
@@ -108,7 +108,7 @@ impl PlanState {
         let PlanState { status, sample, alike, interval, .. } = *self;
         let Some([last, held]) = sample else { return period };
         let passed = t - last;
-        let is_same = (passed - held).abs() <= ON_TIME * held + 2.0 * f64::EPSILON * t.abs();
+        let is_same = (passed - held).abs() <= TOLERANCES.on_time * held + 2.0 * f64::EPSILON * t.abs();
         let is_usual = passed < QUICKER * held && alike + 1 >= ALIKE && is_like(passed, interval);
         match status {
             _ if is_same => held,
@@ -133,10 +133,10 @@ impl PlanState {
     pub(super) fn is_regular(&self, t: f64, hold: f64) -> bool {
         let PlanState { plan, sample, .. } = self;
         sample.is_some_and(|[last, held]| {
-            let tolerance = ON_TIME * held + 2.0 * f64::EPSILON * t.abs();
+            let tolerance = TOLERANCES.on_time * held + 2.0 * f64::EPSILON * t.abs();
             plan.backup_plan.is_uniform
                 && (t == last || t >= last + held - tolerance)
-                && (hold - held).abs() <= ON_TIME * held
+                && (hold - held).abs() <= TOLERANCES.on_time * held
         })
     }
 
