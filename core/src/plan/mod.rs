@@ -34,7 +34,7 @@ mod search;
 mod settings;
 
 pub use backup_plan::{BackupPlan, Tightest};
-pub(crate) use check::TOLERANCES;
+pub(crate) use check::{CheckTolerances, TOLERANCES};
 pub use failure::{Failure, Names};
 pub(crate) use integral::{Integral, Limit};
 pub(crate) use model::slopes;
