@@ -137,7 +137,8 @@ pub(crate) const TOLERANCES: CheckTolerances = CheckTolerances {
     // more pieces.
     truncated: 1e-10,
     // A tenth of the least margin, which is the change of h if each state moves by 1e-7 (`DecisionSettings::resolved`). With
-    // more, a plan may lead where the plant does not go, as past a wind on a short stretch. With less, pieces get shorter.
+    // more, a plan may lead where the plant does not go, as past a wind on a short stretch
+    // (`a_large_residual_lets_a_plan_through_that_the_plant_breaks`). With less, pieces get shorter.
     residual: 1e-8,
     // Cost, and one more decision. After a halved piece the next is tried at that length, since what curved it is still
     // there. The factors 1.2, 1.44, 2.07, ... soon lift that limit. Until it overflows, after a dozen pieces, the plant also
@@ -235,3 +236,80 @@ pub(crate) const TOLERANCES: CheckTolerances = CheckTolerances {
     // moves by less is taken for still; with less, one that is still is refused.
     unmoved: 1e-12,
 };
+
+#[cfg(test)]
+mod tests {
+    use alloc::sync::Arc;
+
+    use super::{CheckTolerances, TOLERANCES};
+    use crate::barriers::StateBound;
+    use crate::dynamics::ControlAffine;
+    use crate::lie;
+    use crate::plan::check::{Grid, Walk};
+    use crate::plan::model::Model;
+    use crate::plan::settings::SETTINGS;
+    use crate::plan::{Failure, Requirement};
+    use crate::qp::Bounds;
+    use crate::scalar::Scalar;
+
+    /// A boat (m, m) that its input (m/s) moves along the first axis. A stream 0.2 m wide at 3 m moves it along the second.
+    #[derive(Clone, Copy, Debug)]
+    struct Stream;
+
+    impl ControlAffine<2, 1> for Stream {
+        fn drift<S: Scalar>(&self, x: &[S; 2]) -> [S; 2] {
+            let within = -((x[0] - 3.0) / 0.1).squared() + 1.0;
+            [S::zero(), within.max(S::zero())]
+        }
+
+        fn input_map<S: Scalar>(&self, _x: &[S; 2]) -> [[S; 1]; 2] {
+            [[S::one()], [S::zero()]]
+        }
+    }
+
+    /// With a residual that hides the stream, the check follows the boat to a place where it does not go. Small steps of the
+    /// plant, which know neither expansions nor tolerances, lead out of the set.
+    #[test]
+    fn a_large_residual_lets_a_plan_through_that_the_plant_breaks() {
+        const CROSSING: f64 = 10.0;
+        let beside = StateBound::at_most(1, 0.1).expect("valid bound");
+        let source = lie::along(Arc::new(Stream), beside, 2).expect("valid source");
+        let plant = source.predict().expect("a plant");
+        let until = f64::INFINITY;
+        let kept = Requirement {
+            barrier: 0,
+            is_limit: false,
+            model: plant,
+            from: 0.0,
+            until,
+            margin: 1e-6,
+            firm: 0.0,
+            reserve: 0.0,
+        };
+        let (bounds, requirements) = (Bounds::NONE, [kept]);
+        let model = Model {
+            plant,
+            dims: [2, 1],
+            bounds: &bounds,
+            integral: None,
+            settings: &SETTINGS,
+            step: CROSSING,
+        };
+        let checked = |tolerances: &CheckTolerances| {
+            let grid = Grid { period: CROSSING, even: true };
+            let mut walk = Walk::new(model, tolerances, &requirements, 1.0, grid, (0.0, &[0.0; 2]))?;
+            walk.hold_until(&[1.0], CROSSING)
+        };
+        let refused = checked(&TOLERANCES);
+        assert!(matches!(refused, Err(Failure::Broken { .. })), "{refused:?}");
+        assert_eq!(checked(&CheckTolerances { residual: 1e3, ..TOLERANCES }), Ok(()));
+
+        let (mut x, mut rate, dt) = ([0.0; 2], [0.0; 2], 1e-4);
+        for _ in 0..100_000 {
+            plant.rate(&x, &[1.0], &mut rate);
+            x = [x[0] + dt * rate[0], x[1] + dt * rate[1]];
+        }
+        // The integral of 1 − (s/0.1)² over the stream is 4/30.
+        assert!((x[1] - 4.0 / 30.0).abs() < 1e-3 && plant.value(CROSSING, &x) < 0.0, "{x:?}");
+    }
+}
