@@ -4,14 +4,11 @@ use alloc::vec::Vec;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::check::TOLERANCES;
 use super::model::{Linear, Model, largest_eigenvalue};
+use super::settings::SearchSettings;
 use crate::elementary;
 use crate::scalar::all_finite;
-
-/// Price of an input, in units of what one hold of it gains. Near 0 the plant is stopped in as few holds as possible.
-const GENTLENESS: f64 = 0.3;
-/// Largest number of steps of the Riccati equation until it counts as settled.
-const RICCATI: u32 = 2000;
 
 /// u = `input` + `gain` (x − `state`), clamped to the bounds: stops the plant, wherever it is.
 ///
@@ -28,17 +25,6 @@ pub(super) struct StoppingController {
     /// How many times a deviation from the equilibrium grows over a hold under `input` alone: the largest eigenvalue.
     growth: f64,
 }
-
-/// Largest eigenvalue over a hold at which an equilibrium counts as staying: 1, and round-off of a multiple eigenvalue.
-const STAYS: f64 = 1.0 + 1e-4;
-/// Smallest relative to largest part of a deviation that moves over a hold, above which an equilibrium counts as isolated.
-const SOLE: f64 = 1e-6;
-/// Growth of a deviation from an equilibrium over the longest hold that still stabilises it.
-const LOST: f64 = 1.35;
-/// How fast the law approaches an equilibrium that does not stay, relative to how fast the plant leaves it (an exponent).
-const HASTE: f64 = 0.6;
-/// Largest movement of one state over a hold, as a part of another state, that is round-off of a difference.
-const STILL: f64 = 1e-8;
 
 impl StoppingController {
     /// The law around the equilibrium near `x`, with inputs held for `hold` s. `None` if no equilibrium or no law is found.
@@ -63,13 +49,14 @@ impl StoppingController {
     ) -> Option<Self> {
         let Linear { a, b } = model.linear(&state, &input, hold);
         let (growth, (q, r)) = (largest_eigenvalue(&a), prices(model, &[x, &state], &[&input]));
-        let gain = regulator(&a, &b, &q, &r).filter(|gain| gain.iter().all(|v| v.is_finite()))?;
+        let gain = regulator(&a, &b, &q, &r, model.settings.riccati)
+            .filter(|gain| gain.iter().all(|v| v.is_finite()))?;
         growth.is_finite().then_some(Self { state, input, gain: Gain::from(&gain), hold, growth })
     }
 
     /// The same law with shorter holds, multiples of `period`, if the plant leaves the equilibrium sooner.
     pub(super) fn shorter(&self, model: &Model<'_>, period: f64) -> Option<Self> {
-        let hold = (self.longest(LOST) / period) as u32;
+        let hold = (self.longest(model.settings.lost) / period) as u32;
         let hold = f64::from(hold.max(1)) * period;
         match self.stays() || hold >= self.hold {
             true => Some(self.clone()),
@@ -79,7 +66,7 @@ impl StoppingController {
 
     /// Whether the equilibrium stays where it is under `input` alone: no eigenvalue leads away.
     pub(super) fn stays(&self) -> bool {
-        self.growth <= STAYS
+        self.growth <= TOLERANCES.stays
     }
 
     /// Whether the plant has other equilibria near this one under the same input: a vehicle does, a motor does not.
@@ -87,7 +74,7 @@ impl StoppingController {
         let Linear { a, .. } = model.linear(&self.state, &self.input, self.hold);
         let moved = &a - DMatrix::identity(a.nrows(), a.ncols());
         let sizes = moved.singular_values();
-        sizes.min() <= SOLE * sizes.max()
+        sizes.min() <= model.settings.sole * sizes.max()
     }
 
     /// The time in s in which a deviation from the equilibrium grows by the factor `growth`; at most a hold.
@@ -96,6 +83,7 @@ impl StoppingController {
     }
 
     fn at(model: &Model<'_>, state: Vec<f64>, input: Vec<f64>, hold: f64) -> Option<Self> {
+        let SearchSettings { gentleness, lost, haste, still, riccati, .. } = *model.settings;
         let Linear { a, b } = model.linear(&state, &input, hold);
         let growth = largest_eigenvalue(&a);
         if !growth.is_finite() {
@@ -103,7 +91,7 @@ impl StoppingController {
         }
         let nx = a.nrows();
         // Round-off of a difference moves nothing.
-        let moved = (&a - DMatrix::identity(nx, nx)).map(|v| if v.abs() > STILL { v } else { 0.0 });
+        let moved = (&a - DMatrix::identity(nx, nx)).map(|v| if v.abs() > still { v } else { 0.0 });
         let rate = moved / hold;
         let q = rate.transpose() * rate;
         let gained = b.transpose() * &q * &b;
@@ -111,11 +99,14 @@ impl StoppingController {
         // is an equilibrium, as for a point moved by its velocity, nothing is gained, and nothing is braked.
         let reach = b.column_iter().fold(0.0, |m: f64, column| m.max(column.norm_squared()));
         let most = gained.diagonal().max().max(1e-12 * reach / square(hold)).max(f64::MIN_POSITIVE);
-        let r = DMatrix::from_diagonal(&gained.diagonal().map(|g| GENTLENESS * g.max(1e-3 * most)));
+        let r = DMatrix::from_diagonal(&gained.diagonal().map(|g| gentleness * g.max(1e-3 * most)));
         // Whatever no input can speed up is left as it is.
-        let sooner = if growth <= STAYS { 1.0 } else { elementary::powf(growth.min(LOST), HASTE) };
-        let hastened = regulator(&(&a * sooner), &(&b * sooner), &q, &r);
-        let gain = hastened.or_else(|| regulator(&a, &b, &q, &r))?;
+        let sooner = match growth <= TOLERANCES.stays {
+            true => 1.0,
+            false => elementary::powf(growth.min(lost), haste),
+        };
+        let hastened = regulator(&(&a * sooner), &(&b * sooner), &q, &r, riccati);
+        let gain = hastened.or_else(|| regulator(&a, &b, &q, &r, riccati))?;
         Some(Self { state, input, gain: Gain::from(&gain), hold, growth })
     }
 
@@ -287,10 +278,16 @@ fn prices(
     (q, r)
 }
 
-/// The gain of the infinite-horizon regulator, for which the Riccati equation settles.
-fn regulator(a: &DMatrix<f64>, b: &DMatrix<f64>, q: &DMatrix<f64>, r: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+/// The gain of the infinite-horizon regulator, for which the Riccati equation settles within so many `steps`.
+fn regulator(
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
+    q: &DMatrix<f64>,
+    r: &DMatrix<f64>,
+    steps: u32,
+) -> Option<DMatrix<f64>> {
     let mut p = q.clone();
-    for _ in 0..RICCATI {
+    for _ in 0..steps {
         let (next, _) = riccati(&p, a, b, q, r)?;
         let change = (&next - &p).amax();
         p = next;

@@ -17,6 +17,8 @@
 //! | `integral` | the mean of an integral over each period, and its limits |
 //! | `search` | reference trajectories by sequential convex programming |
 //! | `planner` | which trials are made, in which order, and what is kept between samples |
+//! | `check::tolerances` | the numbers that decide what the check accepts |
+//! | `settings` | the numbers that decide how the search proceeds |
 //!
 //! The search is heuristic and may fail. The check does not depend on it, and a promise depends on the check alone.
 
@@ -29,9 +31,10 @@ mod law;
 mod model;
 mod planner;
 mod search;
+mod settings;
 
 pub use backup_plan::{BackupPlan, Tightest};
-pub(crate) use check::ON_TIME;
+pub(crate) use check::{CheckTolerances, TOLERANCES};
 pub use failure::{Failure, Names};
 pub(crate) use integral::{Integral, Limit};
 pub(crate) use model::slopes;

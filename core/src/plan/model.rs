@@ -6,19 +6,11 @@ use alloc::vec::Vec;
 use nalgebra::{DMatrix, DVector, Schur};
 
 use super::Integral;
-use super::check::ROUND_OFF;
+use super::check::TOLERANCES;
+use super::settings::SearchSettings;
 use crate::elementary;
 use crate::lie::Predict;
 use crate::qp::Bounds;
-
-/// Perturbation of a state for differentiation, as a part of its size.
-const DIFFERENCE: f64 = 1e-6;
-/// Largest number of Gauss-Newton steps to an equilibrium.
-const TO_EQUILIBRIUM: u32 = 30;
-/// Largest number of steps of an eigenvalue decomposition: it takes a few for each state.
-const MOST_ROTATIONS: usize = 1000;
-/// Least singular value that counts, as a part of the largest.
-const RANK: f64 = 1e-9;
 
 /// The plant, and the longest step in s of its prediction.
 #[derive(Clone, Copy)]
@@ -29,6 +21,7 @@ pub(super) struct Model<'a> {
     pub(super) bounds: &'a Bounds,
     /// The integral whose mean the plant receives over each period.
     pub(super) integral: Option<Integral>,
+    pub(super) settings: &'a SearchSettings,
     pub(super) step: f64,
 }
 
@@ -77,7 +70,7 @@ impl Model<'_> {
     /// The linear model over `duration` s near `x` and `u`, by central differences.
     pub(super) fn linear(&self, x: &[f64], u: &[f64], duration: f64) -> Linear {
         let nx = x.len();
-        let both = differences(&[x, u].concat(), DIFFERENCE, nx, |end| {
+        let both = differences(&[x, u].concat(), TOLERANCES.difference, nx, |end| {
             let (x, u) = end.split_at_mut(nx);
             self.flow(x, u, duration);
         });
@@ -117,16 +110,19 @@ impl Model<'_> {
         mut u: Vec<f64>,
         missing: impl Fn(&[f64], &mut Vec<(f64, Vec<f64>)>),
     ) -> Option<(Vec<f64>, Vec<f64>)> {
+        let SearchSettings { equilibrium_steps, equilibrium_rate, rank, .. } = *self.settings;
         let (nx, nu) = (self.states(), self.inputs());
         let (mut at, mut outside, duration) = (x.to_vec(), Vec::new(), self.step);
-        for _ in 0..TO_EQUILIBRIUM {
+        for _ in 0..equilibrium_steps {
             let rate = self.rate(&at, &u, duration);
             if !rate.iter().all(|r| r.is_finite()) {
                 return None;
             }
             outside.clear();
             missing(&at, &mut outside);
-            let still = |(x, r): (&f64, &f64)| r.abs() <= 1e-9 + ROUND_OFF * x.abs() / duration;
+            let still = |(x, r): (&f64, &f64)| {
+                r.abs() <= equilibrium_rate + TOLERANCES.round_off * x.abs() / duration
+            };
             if outside.is_empty() && at.iter().zip(rate.iter()).all(still) {
                 return Some((at, u));
             }
@@ -147,7 +143,7 @@ impl Model<'_> {
             let mut stopped = vec![false; nu];
             let step = loop {
                 let svd = jacobian.clone().svd(true, true);
-                let step = svd.solve(&wanted, RANK * svd.singular_values.max()).ok()?;
+                let step = svd.solve(&wanted, rank * svd.singular_values.max()).ok()?;
                 let stops =
                     |i: usize| step[nx + i] != 0.0 && self.bounds.clamp(i, u[i] - step[nx + i]) == u[i];
                 match (0..nu).find(|i| !stopped[*i] && stops(*i)) {
@@ -174,7 +170,7 @@ impl Model<'_> {
 pub(crate) fn slopes(h: &dyn Predict, t: f64, x: &[f64], out: &mut [f64]) {
     let mut moved = x.to_vec();
     for (i, slope) in out.iter_mut().enumerate() {
-        let size = DIFFERENCE * (1.0 + x[i].abs());
+        let size = TOLERANCES.difference * (1.0 + x[i].abs());
         let [above, below] = [size, -size].map(|by| {
             moved[i] = x[i] + by;
             h.value(t, &moved)
@@ -211,7 +207,7 @@ pub(super) fn differences(
 pub(super) fn largest_eigenvalue(matrix: &DMatrix<f64>) -> f64 {
     // A decomposition of NaN need not end.
     let schur = match matrix.iter().all(|v| v.is_finite()) {
-        true => Schur::try_new(matrix.clone(), f64::EPSILON, MOST_ROTATIONS),
+        true => Schur::try_new(matrix.clone(), f64::EPSILON, TOLERANCES.rotations),
         false => None,
     };
     schur.map_or(f64::INFINITY, |schur| {

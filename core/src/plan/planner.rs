@@ -6,87 +6,17 @@ use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::check::{Grid, Walk};
+use super::check::{CheckTolerances, Grid, TOLERANCES, Walk};
 use super::law::{Gain, Reference, StoppingController};
 use super::model::{Model, slopes};
 use super::search::{Descent, Search, Trajectory};
+use super::settings::{SETTINGS, SearchSettings};
 use super::{BackupPlan, Failure, Integral, Plan, Policy, Requirement};
 use crate::lie::Predict;
 use crate::qp::Bounds;
 use crate::{MAX_INPUTS, elementary};
 
 pub(crate) use renewal::SearchProgress;
-
-/// Grids, in order. Each has the part of the time until each deadline after which the search already requires its set, and
-/// the number of holds until the last deadline and after it. The first is for a plant that stops soon, the second for one
-/// that does not, the third for deadlines that leave much time, for which long holds are too coarse.
-const GRIDS: [(f64, [usize; 2]); 3] = [(1.0, [32, 12]), (1.0, [16, 28]), (0.35, [32, 12])];
-/// The last grid, if there is a deadline: for a plant that takes many times as long as that to reach an equilibrium.
-const SLOW: (f64, [usize; 2]) = (1.0, [4, 40]);
-/// The length of a hold in periods if there is no deadline.
-const UNDATED: usize = 5;
-/// Longer holds in periods, on the first grid, if there is no deadline: how long a plant takes to stop does not depend on
-/// the period.
-const LONGER: [usize; 2] = [40, 320];
-/// Rounds of a search: the number of guesses that continue, nearest first, and the quadratic programs for each of them.
-const ROUNDS: [(usize, u32); 3] = [(12, 2), (5, 6), (3, 12)];
-/// The same for guesses that lead to an equilibrium within the sets: usually one of them is a plan as it is.
-const AIMED: &[(usize, u32)] = &[(2, 2), (2, 6)];
-/// The number of grids for guesses near a plan that was found.
-const BESIDE_GRIDS: usize = 2;
-/// The rounds for these guesses.
-const BESIDE: &[(usize, u32)] = &[(3, 4), (2, 20)];
-/// Largest violation at which a trajectory is worth the exact check, as a part of the size of h.
-const WORTH: f64 = 0.01;
-/// Margins in the search, in units of those of the check, so that the answer passes the check.
-const SEARCHED: f64 = 3.0;
-/// Margins for the remainder of a plan that was checked before, in the same unit: the plant deviates from the model by
-/// round-off at least.
-const KEPT: f64 = 0.5;
-/// Margins for another input if the next sample may come at any time, in the same unit: the rest is room for the plan to
-/// move.
-const WARY: f64 = 4.0;
-/// Margins for a plan that is followed though it is lost, in the same unit: h may fall short by a hundredth of |h| at the
-/// first sample at most.
-const NEARLY: f64 = -100.0;
-/// Margin at a limit of an integral in the search, as a part of the distance to it at the start.
-const ROOM: f64 = 1e-3;
-/// Largest number of pieces of a rollout between samples, or, if that is more, as a multiple of those of the current plan.
-const HURRIED: [u32; 2] = [1000, 4];
-/// Largest number of checks of a trajectory, each after the first with more margin.
-const TIGHTENED: u32 = 12;
-/// Largest number of consecutive checks whose shortfall hardly decreases.
-const STUCK: u32 = 3;
-/// A shortfall hardly decreases if it stays above this part of the least one so far.
-const LESS: f64 = 0.7;
-/// The number of quadratic programs between two checks.
-const TIGHTENING: u32 = 4;
-/// Error of the model over a hold, as a part of the size of a state: in the search, and in the check.
-const RESOLVED: [f64; 2] = [1e-5, 1e-8];
-/// The longest step of the model, in sampling periods.
-const COARSE: f64 = 4.0;
-/// The number of steps in a hold with the longest step of the model, if that step is longer than [`COARSE`] periods.
-const FINE: f64 = 32.0;
-/// The number of samples in a usual period above which a plan has longer holds.
-const FREQUENT: f64 = 4.0;
-/// Largest number of samples until a deadline.
-const MOST_SAMPLES: usize = 100_000_000;
-/// Growth of a deviation over a hold of the search above which its grid is refined.
-const LED: f64 = 1.8;
-/// Largest refinement of that grid.
-const FINEST: usize = 3;
-/// Halvings of the model's step until it is resolved.
-const HALVINGS: u32 = 7;
-/// Largest number of evaluations of a policy over a hold of the search, which uses their mean.
-const ASKED: f64 = 16.0;
-/// First guesses: inputs as a part of their bounds, and the part of the time for which they are held.
-const GUESSES: [[f64; 2]; 4] = [[0.4, 0.35], [0.6, 0.1], [0.5, 0.0], [1.0, 0.6]];
-/// The depth inside a set that the equilibrium aims at, in units of the required depth, so that round-off does not miss it.
-const BEYOND: f64 = 1.5;
-/// How many times as deep inside the sets as the last one the next equilibrium is sought, and how often.
-const DEEPER: (f64, usize) = (4.0, 10);
-/// How far a plan without an equilibrium is sought, in units of how far it has to reach: the next search is that much later.
-const AMPLE: f64 = 1.5;
 
 /// What a first guess does by default: stop the plant, or, if there is no equilibrium, hold the input nearest to 0.
 struct Guide(Option<StoppingController>);
@@ -141,6 +71,8 @@ pub(crate) struct Planner<'a> {
     dims: [usize; 2],
     bounds: &'a Bounds,
     requirements: &'a [Requirement<'a>],
+    tolerances: &'a CheckTolerances,
+    settings: &'a SearchSettings,
     /// The time in s until the next sample, and the usual one between samples.
     period: f64,
     usual: f64,
@@ -178,6 +110,8 @@ impl<'a> Planner<'a> {
             dims,
             bounds,
             requirements,
+            tolerances: &TOLERANCES,
+            settings: &SETTINGS,
             period,
             usual: period,
             size,
@@ -247,15 +181,15 @@ impl<'a> Planner<'a> {
     fn pace(&self) -> f64 {
         let samples = self.usual / self.period;
         // The mean of an integral is taken over each period.
-        if self.integral.is_some() || samples <= FREQUENT {
+        if self.integral.is_some() || samples <= self.settings.frequent {
             return self.period;
         }
         (samples + 0.5) as u64 as f64 * self.period
     }
 
     fn model(&self, step: f64) -> Model<'a> {
-        let Self { plant, dims, bounds, integral, .. } = *self;
-        Model { plant, dims, bounds, integral, step }
+        let Self { plant, dims, bounds, integral, settings, .. } = *self;
+        Model { plant, dims, bounds, integral, settings, step }
     }
 
     /// Searches for a plan from `x` at `t`.
@@ -279,15 +213,16 @@ impl<'a> Planner<'a> {
         // The failure of the nearest trial says more than that of another trial, or of a grid without trials.
         let (mut failure, mut nearest) = (None, f64::INFINITY);
         let is_dated = self.last(t) > t || horizon.is_some();
-        let longer = LONGER.into_iter().filter(|_| !is_dated).map(|undated| (GRIDS[0], undated));
-        let slow = Some((SLOW, UNDATED)).filter(|_| is_dated && horizon.is_none());
-        let most = if self.beside.is_some() { BESIDE_GRIDS } else { usize::MAX };
-        let grids = GRIDS.map(|grid| (grid, UNDATED)).into_iter().chain(slow).chain(longer).take(most);
+        let SearchSettings { grids, slow_grid, undated, undated_longer, searched, .. } = *self.settings;
+        let longer = undated_longer.into_iter().filter(|_| !is_dated).map(|undated| (grids[0], undated));
+        let slow = Some((slow_grid, undated)).filter(|_| is_dated && horizon.is_none());
+        let most = if self.beside.is_some() { self.settings.beside_grids } else { usize::MAX };
+        let grids = grids.map(|grid| (grid, undated)).into_iter().chain(slow).chain(longer).take(most);
         for ((part, holds), undated) in grids {
             let sooner = |r: &Requirement<'a>| {
                 let margin = match r.is_limit {
-                    true => ROOM * r.model.value(t, x).abs(),
-                    false => r.margin.max((r.margin + r.reserve) / SEARCHED),
+                    true => self.settings.room * r.model.value(t, x).abs(),
+                    false => r.margin.max((r.margin + r.reserve) / searched),
                 };
                 Requirement { from: t + part * (r.from - t), margin, ..*r }
             };
@@ -296,7 +231,7 @@ impl<'a> Planner<'a> {
                 failure.get_or_insert(Failure::TooLong);
                 continue;
             };
-            let resolved = RESOLVED.map(|error| self.resolved(x, hold, error));
+            let resolved = self.settings.resolved.map(|error| self.resolved(x, hold, error));
             let [Some(coarse), Some(fine)] = resolved else {
                 failure.get_or_insert(Failure::Singular);
                 continue;
@@ -304,10 +239,11 @@ impl<'a> Planner<'a> {
             let (sketch, model) = (self.model(coarse), self.model(fine));
             let mut guide = StoppingController::around(&model, x, hold);
             // If a deviation grows too much within a hold, shorter holds are used.
-            let finer =
-                guide.as_ref().map_or(1, |guide| (hold / guide.longest(LED) * (1.0 - 1e-9)) as usize + 1);
+            let finer = guide
+                .as_ref()
+                .map_or(1, |guide| (hold / guide.longest(self.settings.led) * (1.0 - 1e-9)) as usize + 1);
             if finer > 1
-                && let finer = finer.min(FINEST)
+                && let finer = finer.min(self.settings.finest)
                 && let holds = (holds.map(|n| n * finer), undated.div_ceil(finer))
                 && let Some(grid) = self.grid(t, &requirements, holds, horizon)
             {
@@ -329,7 +265,7 @@ impl<'a> Planner<'a> {
             let search = Search {
                 model: sketch,
                 requirements,
-                strictness: SEARCHED,
+                strictness: searched,
                 times: &times,
                 x,
                 size: self.size,
@@ -337,25 +273,25 @@ impl<'a> Planner<'a> {
                 quick: false,
                 sizes: vec![0.0; self.requirements.len()],
             };
-            let begin = |inputs: Vec<Vec<f64>>| Descent::from(search.run(inputs));
+            let begin = |inputs: Vec<Vec<f64>>| search.descent(inputs);
             if let Some(before) = self.before.filter(|_| horizon.is_some()) {
                 let held = |hold: &[f64]| before.mean(hold[0], hold[1])[..self.dims[1]].to_vec();
                 let mut inputs: Vec<Vec<f64>> = times.windows(2).map(held).collect();
                 inputs.push(guide.equilibrium_input(&sketch));
-                if let Ok(plan) = self.descend(&search, vec![begin(inputs)], &ROUNDS, &ending) {
+                if let Ok(plan) = self.descend(&search, vec![begin(inputs)], &self.settings.rounds, &ending) {
                     return Ok(plan);
                 }
             }
             if let Some((plan, factor)) = self.beside {
                 let guesses = self.stretched(&sketch, plan, factor, &guide, &times).map(begin);
-                match self.descend(&search, guesses.into(), BESIDE, &ending) {
+                match self.descend(&search, guesses.into(), &self.settings.beside_rounds, &ending) {
                     Ok(plan) => return Ok(plan),
                     Err(_) => continue,
                 }
             }
             let lead = || {
                 let aimed = aim.iter().flat_map(|aim| self.aimed(&sketch, aim, x, &times));
-                self.descend(&search, aimed.map(begin).collect(), AIMED, &ending)
+                self.descend(&search, aimed.map(begin).collect(), &self.settings.aimed_rounds, &ending)
             };
             // A plant with isolated equilibria is led to one of them at once, unless there is a policy.
             let leads_first = self.policies.is_empty()
@@ -367,7 +303,7 @@ impl<'a> Planner<'a> {
             let mut descents: Vec<Descent> =
                 policies.chain(self.guesses(&sketch, &guide, x, &times)).map(begin).collect();
             descents.iter_mut().take(self.policies.len()).for_each(|descent| descent.is_wanted = true);
-            let found = self.descend(&search, descents, &ROUNDS, &ending);
+            let found = self.descend(&search, descents, &self.settings.rounds, &ending);
             let found = found.or_else(|failure| match leads_first {
                 true => Err(failure),
                 false => lead().map_err(|_| failure),
@@ -392,6 +328,7 @@ impl<'a> Planner<'a> {
         rounds: &[(usize, u32)],
         ending: &Ending<'_>,
     ) -> Result<Plan, Option<(f64, Failure)>> {
+        let SearchSettings { worth, tightened, tightening, stuck: most_stuck, less, .. } = *self.settings;
         let (mut checked, mut search): (Option<(f64, Failure)>, _) = (None, search.clone());
         // A few steps show which guesses lead somewhere.
         for &(most, iterations) in rounds {
@@ -406,12 +343,12 @@ impl<'a> Planner<'a> {
             for descent in &mut descents {
                 search.improve(descent, iterations);
                 let violation = descent.best.violation;
-                if violation > WORTH && violation >= nearest {
+                if violation > worth && violation >= nearest {
                     continue;
                 }
                 // A requirement broken between the nodes gets more margin at the nodes.
                 let (mut least, mut stuck) = (f64::INFINITY, 0);
-                for _ in 0..TIGHTENED {
+                for _ in 0..tightened {
                     let gains = search.gains(descent);
                     let found = match self.finish(search.times, &descent.best, gains, ending) {
                         Ok(plan) => return Ok(plan),
@@ -423,22 +360,22 @@ impl<'a> Planner<'a> {
                     }
                     match found {
                         Failure::Broken { barrier, slack, .. }
-                            if descent.best.violation <= WORTH && stuck < STUCK =>
+                            if descent.best.violation <= worth && stuck < most_stuck =>
                         {
-                            stuck = if -slack > LESS * least { stuck + 1 } else { 0 };
+                            stuck = if -slack > less * least { stuck + 1 } else { 0 };
                             least = least.min(-slack);
                             search.tighten(barrier, slack, &descent.best);
                             let wanted = descent.is_wanted;
-                            *descent = Descent::from(search.run(descent.best.inputs.clone()));
+                            *descent = search.descent(descent.best.inputs.clone());
                             descent.is_wanted = wanted;
-                            search.improve(descent, TIGHTENING);
+                            search.improve(descent, tightening);
                         }
                         _ => break,
                     }
                 }
             }
         }
-        let missed = descents.iter().map(|descent| &descent.best).filter(|best| best.violation > WORTH);
+        let missed = descents.iter().map(|descent| &descent.best).filter(|best| best.violation > worth);
         let missed = missed.filter_map(|best| Some((best.violation, self.missed(search.times, best)?)));
         // A trial that is far off was also checked, but only up to its first violation. Its largest violation says more.
         Err(missed.chain(checked).min_by(|a, b| a.0.total_cmp(&b.0)))
@@ -453,7 +390,9 @@ impl<'a> Planner<'a> {
                 times.iter().zip(&found.states).map(|(t, x)| requirement.model.value(*t, x)).collect();
             let size = h.iter().fold(f64::MIN_POSITIVE, |size: f64, h| size.max(h.abs()));
             for (k, h) in h.iter().enumerate().skip(1) {
-                let next = times.get(k + 1).map_or(f64::INFINITY, |next| next - 1e-5 * (next - times[k]));
+                let next = times
+                    .get(k + 1)
+                    .map_or(f64::INFINITY, |next| next - self.settings.on_node * (next - times[k]));
                 let slack = h - requirement.margin;
                 if requirement.from < next && times[k] < requirement.until && -slack / size > most {
                     let (barrier, time) = (requirement.barrier, requirement.from.max(times[k]));
@@ -476,7 +415,8 @@ impl<'a> Planner<'a> {
         horizon: Option<f64>,
     ) -> Option<(f64, Vec<f64>)> {
         // A deadline that is a whole number of periods stays one despite round-off.
-        let sample = |r: &Requirement<'_>| ((r.from - t) / self.period + 1e-5).max(0.0) as usize;
+        let sample =
+            |r: &Requirement<'_>| ((r.from - t) / self.period + self.settings.on_node).max(0.0) as usize;
         let mut deadlines: Vec<usize> =
             requirements.iter().filter(|r| r.from.is_finite()).map(sample).collect();
         deadlines.sort_unstable();
@@ -484,10 +424,11 @@ impl<'a> Planner<'a> {
         let last = deadlines.last().copied().unwrap_or(0);
         // Past the actual last deadline, not the one used in the search.
         let past = horizon.map(|horizon| {
-            let until = (self.last(t) + AMPLE * horizon).max(self.before.map_or(t, |before| before.until));
+            let until = (self.last(t) + self.settings.ample * horizon)
+                .max(self.before.map_or(t, |before| before.until));
             ((until - t) / self.period + 0.5) as usize + 1 - last
         });
-        if last.saturating_add(past.unwrap_or(0)) > MOST_SAMPLES {
+        if last.saturating_add(past.unwrap_or(0)) > self.settings.most_samples {
             return None;
         }
         let hold = match past {
@@ -557,7 +498,7 @@ impl<'a> Planner<'a> {
             let at = t + self.period;
             let has_reference =
                 plan.reference.as_ref().is_some_and(|r| r.hold_at(at, grid.slack()).is_some());
-            let strictness = if self.regular { 1.0 } else { WARY };
+            let strictness = if self.regular { 1.0 } else { self.tolerances.wary };
             let walk = |follows| self.walk(plan, strictness, grid, (t, x), Some(u), follows);
             match has_reference {
                 // A plan without an equilibrium ends with its reference.
@@ -588,7 +529,7 @@ impl<'a> Planner<'a> {
         let nu = self.dims[1];
         // Replays `held` of its holds, then applies the law behind it.
         let replay = |grid: Grid, held: usize, follows: bool| {
-            let mut walk = self.begin(plan, KEPT, grid, (t, x))?;
+            let mut walk = self.begin(plan, self.tolerances.kept, grid, (t, x))?;
             let mut at = t;
             let hold = |walk: &mut Walk<'a>, mut u: [f64; MAX_INPUTS], end: f64| {
                 self.model(self.pace()).clamp(&mut u[..nu]);
@@ -621,7 +562,7 @@ impl<'a> Planner<'a> {
                 false => replay(grid, 1, true).or_else(|failure| replay(grid, 1, false).map_err(|_| failure)),
             };
             kept.or_else(|failure| {
-                let follow = |follows| self.walk(plan, KEPT, grid, (t, x), None, follows);
+                let follow = |follows| self.walk(plan, self.tolerances.kept, grid, (t, x), None, follows);
                 follow(true).or_else(|_| follow(false)).map_err(|_| failure)
             })
         })
@@ -634,14 +575,15 @@ impl<'a> Planner<'a> {
     /// Why it fails.
     pub(crate) fn holds(&self, t: f64, x: &[f64], u: &[f64]) -> Result<(), Failure> {
         let grid = Grid { period: self.period, even: true };
-        let mut walk = Walk::new(self.model(self.pace()), self.requirements, 1.0, grid, (t, x))?;
+        let mut walk =
+            Walk::new(self.model(self.pace()), self.tolerances, self.requirements, 1.0, grid, (t, x))?;
         walk.hold_until(u, t + self.period)
     }
 
     /// Runs the plant from `x` until the next sample, under `u`, to round-off.
     pub(crate) fn run(&self, x: &mut [f64], u: &[f64]) {
         let grid = Grid { period: self.period, even: true };
-        if let Ok(mut walk) = Walk::new(self.model(self.pace()), &[], 0.0, grid, (0.0, x)) {
+        if let Ok(mut walk) = Walk::new(self.model(self.pace()), self.tolerances, &[], 0.0, grid, (0.0, x)) {
             walk.run(x, u, self.period);
         }
     }
@@ -653,7 +595,7 @@ impl<'a> Planner<'a> {
     /// Why it fails.
     pub(crate) fn nearly(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<[f64; MAX_INPUTS], Failure> {
         let grid = Grid { period: self.period, even: true };
-        let follow = |follows| self.walk(plan, NEARLY, grid, (t, x), None, follows);
+        let follow = |follows| self.walk(plan, self.tolerances.nearly, grid, (t, x), None, follows);
         let near = follow(true).or_else(|failure| follow(false).map_err(|_| failure))?;
         Ok(near.inputs[0].1)
     }
@@ -676,7 +618,8 @@ impl<'a> Planner<'a> {
         grid: Grid,
         start: (f64, &[f64]),
     ) -> Result<Walk<'a>, Failure> {
-        let walk = Walk::new(self.model(self.pace()), self.requirements, strictness, grid, start)?;
+        let model = self.model(self.pace());
+        let walk = Walk::new(model, self.tolerances, self.requirements, strictness, grid, start)?;
         Ok(walk.after(&plan.backup_plan))
     }
 
@@ -691,7 +634,8 @@ impl<'a> Planner<'a> {
     ) -> Result<BackupPlan, Failure> {
         let mut walk = self.begin(plan, strictness, grid, (t, x))?;
         if self.hurried && strictness >= 1.0 {
-            walk.most_pieces = HURRIED[0].max(HURRIED[1].saturating_mul(plan.backup_plan.pieces));
+            let [least, times] = self.tolerances.hurried;
+            walk.most_pieces = least.max(times.saturating_mul(plan.backup_plan.pieces));
         }
         if let Some(u) = first {
             walk.hold_until(u, t + self.period)?;
@@ -709,9 +653,10 @@ impl<'a> Planner<'a> {
     /// a step that does so at one of them: at the other a tank may run empty.
     fn resolved(&self, x: &[f64], hold: f64, allowed: f64) -> Option<f64> {
         let nu = self.dims[1];
-        let mut step = (hold / 8.0).min((COARSE * self.period).max(hold / FINE));
+        let SearchSettings { coarse, fine, step_halvings, .. } = *self.settings;
+        let mut step = (hold / 8.0).min((coarse * self.period).max(hold / fine));
         let mut one = None;
-        for _ in 0..HALVINGS {
+        for _ in 0..step_halvings {
             let is_resolved = |sign: f64| {
                 let mut u: Vec<f64> = (0..nu).map(|i| sign * self.model(step).reach(i, self.size)).collect();
                 self.model(step).clamp(&mut u);
@@ -753,7 +698,7 @@ impl<'a> Planner<'a> {
         let (mut x, mut u) = (x.to_vec(), vec![0.0; model.inputs()]);
         let mean = |hold: &[f64]| {
             let length = hold[1] - hold[0];
-            let parts = (length / self.period).clamp(1.0, ASKED) as u32;
+            let parts = (length / self.period).clamp(1.0, self.settings.asked) as u32;
             let part = length / f64::from(parts);
             let mut mean = vec![0.0; u.len()];
             for k in 0..parts {
@@ -782,6 +727,7 @@ impl<'a> Planner<'a> {
         (end, hold): (f64, f64),
         x: &[f64],
     ) -> Option<StoppingController> {
+        let SearchSettings { searched, beyond, deeper: (deeper, times), .. } = *self.settings;
         let within = |x: &[f64], u: &[f64], depth: f64| {
             model.equilibrium_within(x, u.to_vec(), |x, missing| {
                 for requirement in requirements.iter().filter(|r| r.until > end) {
@@ -794,14 +740,13 @@ impl<'a> Planner<'a> {
                     slopes(requirement.model, end, x, &mut gradient);
                     let steepness = elementary::sqrt(gradient.iter().map(|g| g * g).sum());
                     gradient.iter_mut().for_each(|g| *g /= steepness);
-                    missing.push(((BEYOND * wanted - h) / steepness, gradient));
+                    missing.push(((beyond * wanted - h) / steepness, gradient));
                 }
             })
         };
-        let near = guide.0.as_ref().and_then(|stopping| within(&stopping.state, &stopping.input, SEARCHED));
-        let mut aim = near.or_else(|| within(x, &guide.equilibrium_input(model), SEARCHED))?;
-        let (deeper, times) = DEEPER;
-        let depths = core::iter::successors(Some(SEARCHED * deeper), |depth| Some(depth * deeper));
+        let near = guide.0.as_ref().and_then(|stopping| within(&stopping.state, &stopping.input, searched));
+        let mut aim = near.or_else(|| within(x, &guide.equilibrium_input(model), searched))?;
+        let depths = core::iter::successors(Some(searched * deeper), |depth| Some(depth * deeper));
         for depth in depths.take(times) {
             let Some(found) = within(&aim.0, &aim.1, depth) else { break };
             aim = found;
@@ -923,7 +868,8 @@ impl<'a> Planner<'a> {
             inputs
         };
         let others = sides.len() - 1;
-        let sizes = GUESSES.into_iter().flat_map(move |guess| (1..=others).map(move |side| (side, guess)));
-        core::iter::once((0, GUESSES[0])).chain(sizes).map(move |(side, guess)| run(&sides[side], guess))
+        let guesses = self.settings.guesses;
+        let sizes = guesses.into_iter().flat_map(move |guess| (1..=others).map(move |side| (side, guess)));
+        core::iter::once((0, guesses[0])).chain(sizes).map(move |(side, guess)| run(&sides[side], guess))
     }
 }

@@ -23,26 +23,8 @@ use nalgebra::DMatrix;
 use super::Requirement;
 use super::law::Gain;
 use super::model::{Linear, Model, slopes};
+use super::settings::SearchSettings;
 use crate::scalar::all_finite;
-
-/// Price of a violation as large as h along the trajectory, in units of the price of full inputs all the time.
-const PENALTY: f64 = 300.0;
-/// A row counts as near its edge up to this part of the largest h along the trajectory.
-const NEAR: f64 = 0.1;
-/// Least price of a row that counts, in units of that of a violation.
-const PRICED: f64 = 1e-6;
-/// Initial trust region, as a part of half the width of the bounds.
-const TRUST: f64 = 0.7;
-/// Least trust region, in the same unit.
-const LEAST_TRUST: f64 = 1e-3;
-/// Margin that is added for a shortfall, in units of the shortfall.
-const TIGHTER: f64 = 1.5;
-/// Least size of a requirement that is nearly met, as a part of the largest |h| along the trajectory.
-const LEAST_SIZE: f64 = 1e-4;
-/// Least part of the expected gain at which a step counts as one that went as expected.
-const AS_EXPECTED: f64 = 0.7;
-/// Largest curvature of a trajectory, as a part of its change, for which the linear model counts.
-const BENT: f64 = 0.2;
 
 /// A search: the start, the grid and the requirements on it.
 #[derive(Clone)]
@@ -95,15 +77,6 @@ pub(super) struct Descent {
     pub(super) is_wanted: bool,
 }
 
-impl Descent {
-    pub(super) fn from(guess: Trajectory) -> Self {
-        let price = |&(.., value): &(usize, usize, f64)| if value < 0.0 { PENALTY } else { 0.0 };
-        let prices = guess.values.iter().map(price).collect();
-        let trust = vec![TRUST; guess.inputs[0].len()];
-        Self { best: guess, trust, prices, linear: None, is_wanted: false }
-    }
-}
-
 /// The answer of a quadratic program.
 struct Answer {
     inputs: Vec<Vec<f64>>,
@@ -120,15 +93,16 @@ impl Search<'_> {
     /// time for such an exact answer, it adds at most half of the remaining depth there, and from then on the size of the
     /// requirement is its size while it is in force.
     pub(super) fn tighten(&mut self, barrier: usize, slack: f64, near: &Trajectory) {
+        let SearchSettings { tighter, least_size, .. } = *self.settings();
         let of_barrier = self.requirements.iter_mut().enumerate().filter(|(_, r)| r.barrier == barrier);
         for (i, requirement) in of_barrier {
             let margin = self.strictness * requirement.margin;
-            let mut more = -TIGHTER * slack;
+            let mut more = -tighter * slack;
             if !self.quick {
                 let values = near.values.iter().filter(|(of, ..)| *of == i).map(|(.., value)| *value);
                 more = more.min(0.5 * values.clone().fold(0.0, f64::max));
                 let h = values.map(|value| (value + margin).abs());
-                self.sizes[i] = h.fold(LEAST_SIZE * near.sizes[i], f64::max);
+                self.sizes[i] = h.fold(least_size * near.sizes[i], f64::max);
             }
             requirement.margin += more / self.strictness;
         }
@@ -141,6 +115,19 @@ impl Search<'_> {
 
     fn width(&self, i: usize) -> f64 {
         self.model.reach(i, self.size).max(f64::MIN_POSITIVE)
+    }
+
+    fn settings(&self) -> &SearchSettings {
+        self.model.settings
+    }
+
+    /// The descent that begins with the trajectory under `inputs`, of which the last is for the equilibrium.
+    pub(super) fn descent(&self, inputs: Vec<Vec<f64>>) -> Descent {
+        let (best, SearchSettings { penalty, trust, .. }) = (self.run(inputs), *self.settings());
+        let price = |&(.., value): &(usize, usize, f64)| if value < 0.0 { penalty } else { 0.0 };
+        let prices = best.values.iter().map(price).collect();
+        let trust = vec![trust; best.inputs[0].len()];
+        Descent { best, trust, prices, linear: None, is_wanted: false }
     }
 
     /// Predicts the trajectory under `inputs`, of which the last is for the equilibrium.
@@ -180,7 +167,10 @@ impl Search<'_> {
                     sizes[i] = sizes[i].max(h.abs());
                 }
                 // A deadline between two nodes is required at the one before.
-                let next = self.times.get(k + 1).map_or(f64::INFINITY, |next| next - 1e-5 * (next - t));
+                let next = self
+                    .times
+                    .get(k + 1)
+                    .map_or(f64::INFINITY, |next| next - self.settings().on_node * (next - t));
                 let begun = requirement.from < next && t < requirement.until;
                 if k > 0 && begun {
                     values.push((i, k, h - self.strictness * requirement.margin));
@@ -194,6 +184,7 @@ impl Search<'_> {
     }
 
     fn appraise(&self, of: &mut Trajectory) {
+        let SearchSettings { penalty, end_rate, .. } = *self.settings();
         let share = 1.0 / of.inputs.len() as f64;
         let effort: f64 = of
             .inputs
@@ -208,12 +199,12 @@ impl Search<'_> {
         let mut violation = 0.0;
         let mut most = 0.0_f64;
         let missing = of.values.iter().map(|&(i, _, value)| -value / of.sizes[i].max(f64::MIN_POSITIVE));
-        let moving = of.rate.iter().zip(&of.rates).map(|(r, scale)| r.abs() / scale - 0.01);
+        let moving = of.rate.iter().zip(&of.rates).map(|(r, scale)| r.abs() / scale - end_rate);
         for part in missing.chain(moving.filter(|_| self.at_equilibrium)) {
             violation += part.max(0.0);
             most = most.max(part);
         }
-        (of.merit, of.violation) = (effort + PENALTY * violation, most);
+        (of.merit, of.violation) = (effort + penalty * violation, most);
         if !(of.merit.is_finite() && of.states.iter().all(|x| all_finite(x))) {
             (of.merit, of.violation) = (f64::INFINITY, f64::INFINITY);
         }
@@ -221,9 +212,10 @@ impl Search<'_> {
 
     /// Improves the best trajectory of `descent` by at most `iterations` quadratic programs.
     pub(super) fn improve(&self, descent: &mut Descent, iterations: u32) {
+        let SearchSettings { least_trust, as_expected, .. } = *self.settings();
         for _ in 0..iterations {
             let Descent { best, trust, prices, linear, .. } = descent;
-            if !best.merit.is_finite() || trust.iter().all(|t| *t < LEAST_TRUST) {
+            if !best.merit.is_finite() || trust.iter().all(|t| *t < least_trust) {
                 break;
             }
             let along = linear.get_or_insert_with(|| self.linear(best));
@@ -234,7 +226,7 @@ impl Search<'_> {
             let expected = best.merit - answer.merit;
             let mut next = self.run(answer.inputs.clone());
             // Feedback may lead a plant where open-loop inputs do not: an unstable plant forgets no deviation.
-            if best.merit - next.merit <= AS_EXPECTED * expected
+            if best.merit - next.merit <= as_expected * expected
                 && let Some(gains) = Gain::along(&self.model, &answer.states, &answer.inputs, along)
             {
                 let led = self.steer(answer.inputs, Some((&answer.states, &gains)));
@@ -244,7 +236,7 @@ impl Search<'_> {
                 }
             }
             let gain = best.merit - next.merit;
-            if gain > AS_EXPECTED * expected {
+            if gain > as_expected * expected {
                 trust.iter_mut().for_each(|t| *t = (2.0 * *t).min(2.0));
             } else if gain < 0.3 * expected {
                 self.shrink(trust, best, &next, if gain > 0.0 { 0.5 } else { 0.3 });
@@ -292,7 +284,7 @@ impl Search<'_> {
             let (bent, moved) = ends.fold((0.0_f64, 0.0_f64), |(bent, moved), (((a, b), c), rate)| {
                 (bent.max((a - 2.0 * b + c).abs() / rate), moved.max((c - a).abs() / rate))
             });
-            bent > BENT * moved
+            bent > self.settings().bent * moved
         };
         let bent: Vec<bool> = (0..trust.len()).map(bends).collect();
         let none = !bent.contains(&true);
@@ -306,7 +298,7 @@ impl Search<'_> {
     /// The answer of the quadratic program around `at`. Rows that are far from their edge are added if the answer would
     /// break them.
     fn program(&self, at: &Trajectory, linear: &[Linear], prices: &[f64], trust: &[f64]) -> Option<Answer> {
-        let nx = self.model.states();
+        let (nx, SearchSettings { near, priced, penalty, .. }) = (self.model.states(), *self.settings());
         let slopes_of = |&(i, k, _): &(usize, usize, f64)| {
             let mut gradient = vec![0.0; nx];
             slopes(self.requirements[i].model, self.times[k], &at.states[k], &mut gradient);
@@ -314,7 +306,7 @@ impl Search<'_> {
         };
         let gradients: Vec<Vec<f64>> = at.values.iter().map(slopes_of).collect();
         let is_near = |(&(i, _, value), &price): (&(usize, usize, f64), &f64)| {
-            value <= NEAR * at.sizes[i] || price > PRICED * PENALTY
+            value <= near * at.sizes[i] || price > priced * penalty
         };
         let mut rows: Vec<bool> = at.values.iter().zip(prices).map(is_near).collect();
         loop {
@@ -342,6 +334,7 @@ impl Search<'_> {
         prices: &[f64],
         trust: &[f64],
     ) -> Option<Answer> {
+        let SearchSettings { penalty, priced, iterations, gaps, feasible, .. } = *self.settings();
         let (nx, nu) = (self.model.states(), self.model.inputs());
         let holds = at.inputs.len() - 1;
         let kept: Vec<usize> = (0..rows.len()).filter(|&row| rows[row]).collect();
@@ -428,12 +421,12 @@ impl Search<'_> {
                 q[input(k, i)] = price * u;
             }
         }
-        q[first_slack..].fill(PENALTY);
+        q[first_slack..].fill(penalty);
         // The curvature of the sets, where it is convex in the program.
         let mut indices: Vec<usize> = (0..variables).collect();
         let mut columns = indices.clone();
         for (&(i, k, _), &price) in at.values.iter().zip(prices) {
-            if price > PRICED * PENALTY {
+            if price > priced * penalty {
                 let weight = price / at.sizes[i].max(f64::MIN_POSITIVE);
                 let bent = self.curvature(i, k, &at.states[k]) * weight;
                 for r in 0..nx {
@@ -452,11 +445,11 @@ impl Search<'_> {
         let cones = [ZeroConeT(equations), NonnegativeConeT(b.len() - equations)];
         let settings = DefaultSettings {
             verbose: false,
-            max_iter: 60,
+            max_iter: iterations,
             iterative_refinement_enable: !self.quick,
-            tol_gap_abs: if self.quick { 1e-4 } else { 1e-6 },
-            tol_gap_rel: if self.quick { 1e-4 } else { 1e-6 },
-            tol_feas: 1e-6,
+            tol_gap_abs: gaps[usize::from(self.quick)],
+            tol_gap_rel: gaps[usize::from(self.quick)],
+            tol_feas: feasible,
             ..DefaultSettings::default()
         };
         let mut solver = DefaultSolver::new(&p, &q, &constraints, &b, &cones, settings).ok()?;
@@ -467,7 +460,7 @@ impl Search<'_> {
             return None;
         }
         let mut inputs = at.inputs.clone();
-        let mut merit = PENALTY * solution.x[first_slack..].iter().map(|s| s.max(0.0)).sum::<f64>();
+        let mut merit = penalty * solution.x[first_slack..].iter().map(|s| s.max(0.0)).sum::<f64>();
         for (k, u) in inputs.iter_mut().enumerate() {
             for (i, u) in u.iter_mut().enumerate() {
                 *u += solution.x[input(k, i)];

@@ -1,6 +1,9 @@
 //! The input of a sample: u_ref if a plan backs it, otherwise the nearest input to it that a plan backs.
+//!
+//! The numbers here say which of these inputs is preferred. No guarantee depends on them, since a plan is behind each.
 
-use super::planning::{AMPLE, Planning};
+use super::planning::Planning;
+use super::settings::DECISIONS;
 use super::{AssuranceStatus, Driver, Reason};
 use crate::MAX_INPUTS;
 use crate::filter::rows::Rows;
@@ -282,7 +285,7 @@ impl Choice<'_, '_> {
         };
         let Rows { slots, workspace, .. } = self.planning.rows;
         let kept = self.planning.now().promises[at.barrier].map_or(0.0, |promise| promise.margin);
-        let margin = slots[at.barrier].promise.settings().margin.max((AMPLE - 1.0) * kept);
+        let margin = slots[at.barrier].promise.settings().margin.max((DECISIONS.ample - 1.0) * kept);
         let h = workspace.report.barriers[at.barrier].h;
         let least = match (self.wished, is_gentle) {
             (true, true) => 0.0,

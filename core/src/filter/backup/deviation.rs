@@ -5,10 +5,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// Shortest time over which a deviation is measured, as a part of a period: over less it is round-off.
-const STRETCH: f64 = 0.5;
-/// Deviation over a hold that every plan has a margin for, as a part of a state's size.
-const COVERED: f64 = 5e-8;
+use super::settings::DECISIONS;
 
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -36,7 +33,7 @@ impl Deviation {
     pub(super) fn see(&mut self, t: f64, x: Option<&[f64]>, state: Vec<f64>, period: f64) {
         self.state = state;
         let stretch = t - self.since;
-        let Some(x) = x.filter(|_| stretch >= STRETCH * period) else { return };
+        let Some(x) = x.filter(|_| stretch >= DECISIONS.stretch * period) else { return };
         for (((rate, last), state), x) in self.rates.iter_mut().zip(&mut self.last).zip(&self.state).zip(x) {
             // A prediction that is not finite carries no information.
             let now = (x - state) / stretch;
@@ -53,7 +50,8 @@ impl Deviation {
     /// By how much each state may deviate from the model after `hold` s; `None` if every plan has a margin for it at `x`.
     pub(super) fn after(&self, hold: f64, x: &[f64]) -> Option<Vec<f64>> {
         let differs = self.rates.iter().map(|rate| rate * hold);
-        let is_covered = differs.clone().zip(x).all(|(differs, x)| differs <= COVERED * (1.0 + x.abs()));
+        let is_covered =
+            differs.clone().zip(x).all(|(differs, x)| differs <= DECISIONS.covered * (1.0 + x.abs()));
         (!is_covered).then(|| differs.collect())
     }
 

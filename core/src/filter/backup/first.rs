@@ -3,19 +3,12 @@
 use alloc::vec::Vec;
 
 use super::planning::Planning;
+use super::settings::{DECISIONS, DecisionSettings};
 use super::state::Promise;
 use crate::MAX_INPUTS;
 use crate::elementary;
 use crate::filter::{AssuranceStatus, Begin};
 use crate::plan::{BackupPlan, Failure, Plan, Planner};
-
-/// Parts of the deadlines for which a plan is sought if none is found for the deadlines themselves; such a plan keeps them
-/// too. Each part prolongs a refusal by as much as the first search.
-pub(super) const SHORTER: [f64; 1] = [0.8];
-/// The approximate largest number of points of a plan's trajectory at which its arrival is looked for.
-const MOST_POINTS: f64 = 4000.0;
-/// How much later the deadline may be than the plan's arrival, as factors that are tried in turn.
-const ARRIVED: [f64; 2] = [1.001, 1.02];
 
 /// The result of a first sample: what is promised, and by which plan.
 pub(super) struct First {
@@ -35,7 +28,8 @@ impl Planning<'_> {
     pub fn plan_from(&self, t: f64, x: &[f64], factor: f64) -> Result<BackupPlan, Failure> {
         let x = &self.state(x)[..];
         let promises = self.promises(t, x, |_| factor);
-        self.first(promises, (t, self.plans.period), x, &[], &SHORTER).map(|first| first.plan.backup_plan)
+        self.first(promises, (t, self.plans.period), x, &[], &DECISIONS.shorter)
+            .map(|first| first.plan.backup_plan)
     }
 
     /// The result of [`Self::plan_from`] for the deadlines themselves, and [`Self::earliest_deadline`], with one search for
@@ -48,7 +42,7 @@ impl Planning<'_> {
     ) -> (Result<BackupPlan, Failure>, Option<(f64, BackupPlan)>) {
         let state = &self.state(x)[..];
         let promises = self.promises(t, state, |_| 1.0);
-        match self.first(promises, (t, self.plans.period), state, &[], &SHORTER) {
+        match self.first(promises, (t, self.plans.period), state, &[], &DECISIONS.shorter) {
             Ok(first) => (Ok(first.plan.backup_plan.clone()), self.least(t, x, longest, Some(first))),
             Err(failure) => (Err(failure), self.least(t, x, longest, None)),
         }
@@ -184,7 +178,8 @@ impl Planning<'_> {
     /// them, at most 1.
     pub(super) fn arrival(&self, promises: &[Option<Promise>], plan: &Plan, t: f64, x: &[f64]) -> f64 {
         let end = plan.backup_plan.inputs.last().map_or(t, |(end, _)| *end);
-        let trajectory = self.along(&plan.backup_plan, t, x, self.plans.period.max((end - t) / MOST_POINTS));
+        let trajectory =
+            self.along(&plan.backup_plan, t, x, self.plans.period.max((end - t) / DECISIONS.most_points));
         let mut part = 0.0_f64;
         for ((promise, slot), model) in promises.iter().zip(&self.rows.slots).zip(self.models()) {
             let Some(promise) = promise.filter(|p| p.from > t && slot.begin == Begin::AtOnce) else {
@@ -207,7 +202,8 @@ impl Planning<'_> {
             };
             self.planned(&sooner, (t, self.plans.period), &[], keeps).is_ok()
         };
-        ARRIVED
+        DECISIONS
+            .arrived
             .into_iter()
             .map(|late| late * part)
             .find(|part| *part > 0.0 && *part < 1.0 && keeps(*part))
@@ -224,33 +220,24 @@ pub(super) fn least_factor<T>(
     find: impl Fn(f64) -> Option<(f64, T)>,
     sooner: impl Fn(f64, &(f64, T)) -> Option<(f64, T)>,
 ) -> Option<(f64, T)> {
-    /// Ratio of two factors below which a nearby search is no longer worthwhile.
-    const FINE: f64 = 1.02;
-    /// Factor below which the search goes no further.
-    const LEAST: f64 = 1e-3;
-    /// Largest factor tried.
-    const MOST: f64 = 1e6;
-    /// Largest number of further searches that do not start nearby.
-    const SEARCHES: u32 = 3;
-    /// Least ratio of the factor found to the one that failed at which such a search is made.
-    const WIDE: f64 = 1.1;
+    let DecisionSettings { factors: [least, most], fine, wide, searches, .. } = DECISIONS;
     // Double the factor until something is found. Then halve it, and reduce it by less whenever nothing is found nearby.
-    let longest = longest.min(MOST);
+    let longest = longest.min(most);
     let (mut low, mut high) = (0.0, 1.0);
     while found.is_none() && high < longest {
         (low, high) = (high, (2.0 * high).min(longest));
         found = find(high);
     }
-    let (mut found, mut part, mut searches) = (found?, 0.5, SEARCHES);
+    let (mut found, mut part, mut searches) = (found?, 0.5, searches);
     loop {
         let between = elementary::sqrt(low * found.0);
-        if FINE * part < 1.0 && found.0 > LEAST {
+        if fine * part < 1.0 && found.0 > least {
             let factor = part * found.0;
             match if factor > low { sooner(factor, &found) } else { None } {
                 Some(nearer) => found = nearer,
                 None => part = elementary::sqrt(part),
             }
-        } else if searches > 0 && low > 0.0 && WIDE * low < found.0 {
+        } else if searches > 0 && low > 0.0 && wide * low < found.0 {
             // Another trajectory may arrive sooner than any near the one found.
             searches -= 1;
             match find(between) {

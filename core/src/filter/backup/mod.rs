@@ -10,12 +10,14 @@
 //! | `sample` | a sample: what is promised, whether it is kept, and which source drives the plant |
 //! | `choice` | the input: the candidates, in order |
 //! | `deviation` | the observed deviation of the plant from the model |
+//! | `settings` | the numbers that decide on a guarantee |
 
 mod choice;
 mod deviation;
 mod first;
 mod planning;
 mod sample;
+mod settings;
 mod state;
 mod status;
 
@@ -35,16 +37,9 @@ use crate::qp::Bounds;
 use choice::Piece;
 pub use planning::Planning;
 use sample::{At, Decision};
+use settings::DECISIONS;
 pub use state::PlanState;
 pub use status::{Assurance, AssuranceStatus, Driver, Reason};
-
-/// How late a measured clock may be, as a part of a hold.
-const JITTER: f64 = 0.05;
-/// The shortest hold that plans distinguish from none, as a part of the period. A shorter one is planned as this, since a
-/// plan may continue even if a sample comes sooner.
-const SHORTEST: f64 = 1e-3;
-/// The same behind an integrator: plans account for every hold of an integral.
-const SHORTEST_INTEGRATED: f64 = 0.125;
 
 /// How a filter makes plans ([`Filter::with_plans`]). A plain number is a period, with plans that end at an equilibrium.
 pub struct Plans {
@@ -304,7 +299,7 @@ impl Backup {
 
     /// The hold that plans assume for an input that is held for `hold` s.
     fn planned_hold(&self, hold: f64, integrates: bool) -> f64 {
-        let shortest = if integrates { SHORTEST_INTEGRATED } else { SHORTEST };
+        let shortest = if integrates { DECISIONS.shortest_integrated } else { DECISIONS.shortest };
         hold.max(shortest * self.plans.period)
     }
 
@@ -413,14 +408,13 @@ fn trial_state(i: usize, trial: usize) -> f64 {
 /// Whether h changes with time alone, at some states, and no bounds on that change are known. h is evaluated at a few times
 /// in s, and over all times at once if it has enclosures.
 fn leaves(slot: &BarrierSlot, states: usize) -> bool {
-    /// Times in s at which h is compared with its first value.
-    const TIMES: [f64; 4] = [0.0, 0.7, 31.0, 4e3];
     let Some(model) = slot.source.predict() else { return false };
-    (0..4).any(|trial| {
+    (0..DECISIONS.trials).any(|trial| {
         let x: Vec<f64> = (0..states).map(|i| trial_state(i, trial)).collect();
-        let values = TIMES.map(|t| model.value(t, &x));
-        let moves = values.iter().any(|h| (h - values[0]).abs() > 1e-9 * (1.0 + values[0].abs()))
-            || model.is_still(&x) == Some(false);
+        let values = DECISIONS.times.map(|t| model.value(t, &x));
+        let moves =
+            values.iter().any(|h| (h - values[0]).abs() > DECISIONS.unmoved * (1.0 + values[0].abs()))
+                || model.is_still(&x) == Some(false);
         moves && model.lowest_from(0.0, &x).is_none_or(|least| least == f64::NEG_INFINITY)
     })
 }

@@ -4,26 +4,15 @@
 use alloc::vec::Vec;
 
 use super::Plans;
+use super::settings::{DECISIONS, DecisionSettings};
 use super::state::{PlanState, Promise};
 use crate::MAX_INPUTS;
 use crate::filter::integrator::{Integrator, insert};
 use crate::filter::rows::{BarrierSlot, Rows};
 use crate::filter::{Begin, End, Integration, Strictness};
 use crate::lie::Predict;
-use crate::plan::{BackupPlan, Failure, Integral, Limit, ON_TIME, Planner, Requirement, slopes};
+use crate::plan::{BackupPlan, Failure, Integral, Limit, Planner, Requirement, TOLERANCES, slopes};
 use crate::qp::Bounds;
-
-/// Margin of a plan, as a part of the size of h at the first sample: for what the model leaves out between two samples.
-const MARGIN: f64 = 1e-4;
-/// The largest margin, as a part of the largest h there is: a small set that is far away has no room for more.
-const ROOM: f64 = 0.05;
-/// The least margin: the change of h if each state moves by the first number (in its unit), plus the second as a part of its
-/// size. Plans are no better resolved.
-const RESOLVED: [f64; 2] = [1e-7, 64.0 * f64::EPSILON];
-/// Margin of rows with plans behind them, in units of the margin of the plans.
-pub(super) const AMPLE: f64 = 2.0;
-/// The part of the time until the end of a plan after which the filter tries again to prolong it, if that failed before.
-const SOONER: f64 = 0.25;
 
 /// The planner of a filter ([`Filter::planning`](crate::filter::Filter::planning)): its barriers along the plant, the
 /// integrator, and how plans are made. It remembers no query.
@@ -114,7 +103,7 @@ impl<'a> Planning<'a> {
             // Not the h of the report, which is missing if u_ref is NaN.
             let h = model.value(t, x);
             // Slightly earlier, so that round-off of a time leaves no gap.
-            let after = |seconds: f64| t + seconds - ON_TIME * self.plans.period;
+            let after = |seconds: f64| t + seconds - TOLERANCES.on_time * self.plans.period;
             let from = match (slot.begin, slot.promise.settings().deadline) {
                 (Begin::At(begin), _) if begin > 0.0 => after(begin),
                 // NaN is required at once, so that the check finds it.
@@ -129,11 +118,11 @@ impl<'a> Planning<'a> {
             };
             let soft = matches!(slot.strictness, Strictness::Soft(_));
             let margin = margin(model, t, x, h);
-            let firm = if from == t && h < AMPLE * margin { after(self.plans.period) } else { t };
+            let firm = if from == t && h < DECISIONS.ample * margin { after(self.plans.period) } else { t };
             // Half of the user's margin, so that a plan backs the rows, which aim at all of it.
-            let reserve = slot.promise.settings().margin / AMPLE;
+            let reserve = slot.promise.settings().margin / DECISIONS.ample;
             // A set that is kept from now on may be nearer to its edge.
-            let reserve = if from == t { reserve.min(h / AMPLE) } else { reserve };
+            let reserve = if from == t { reserve.min(h / DECISIONS.ample) } else { reserve };
             (!soft && until > from).then_some(Promise { from, until, margin, firm, reserve })
         };
         self.rows.slots.iter().zip(self.models()).map(promise).collect()
@@ -230,7 +219,7 @@ impl<'a> Planning<'a> {
                 from,
                 until,
                 // A value at the limit may differ from it by round-off.
-                margin: -0.25 * f64::EPSILON * limit.limit.abs(),
+                margin: -DECISIONS.limit_round_off * limit.limit.abs(),
                 firm: t,
                 reserve: 0.0,
             }
@@ -283,36 +272,32 @@ impl<'a> Planning<'a> {
         match until - horizon {
             _ if is_last => f64::INFINITY,
             due if last < due => due,
-            _ => t + SOONER * (until - t),
+            _ => t + DECISIONS.sooner * (until - t),
         }
     }
 }
 
 /// The margin that plans keep for a barrier with the value `h` at `t` and `x`.
 fn margin(model: &dyn Predict, t: f64, x: &[f64], h: f64) -> f64 {
+    let DecisionSettings { margin, resolved: [least, part], room, .. } = DECISIONS;
     let mut gradient = x.to_vec();
     slopes(model, t, x, &mut gradient);
-    let resolved: f64 =
-        x.iter().zip(&gradient).map(|(x, g)| g.abs() * (RESOLVED[0] + RESOLVED[1] * x.abs())).sum();
+    let resolved: f64 = x.iter().zip(&gradient).map(|(x, g)| g.abs() * (least + part * x.abs())).sum();
     // NaN fails this comparison on purpose.
-    let wanted = (MARGIN * h.abs()).max(resolved);
-    let highest = highest(model, t, x, wanted / ROOM);
-    if highest > 0.0 { wanted.min(ROOM * highest) } else { wanted }
+    let wanted = (margin * h.abs()).max(resolved);
+    let highest = highest(model, t, x, wanted / room);
+    if highest > 0.0 { wanted.min(room * highest) } else { wanted }
 }
 
 /// The largest h found by climbing from `x` at `t`, up to `enough`.
 fn highest(model: &dyn Predict, t: f64, x: &[f64], enough: f64) -> f64 {
-    /// Largest number of steps uphill.
-    const STEPS: u32 = 60;
-    /// Largest number of halvings of a step that does not climb.
-    const HALVINGS: u32 = 30;
     let (mut x, mut gradient, mut next) = (x.to_vec(), x.to_vec(), x.to_vec());
     let mut h = model.value(t, &x);
-    for _ in 0..STEPS {
+    for _ in 0..DECISIONS.climbs {
         slopes(model, t, &x, &mut gradient);
         let steepness: f64 = gradient.iter().map(|g| g * g).sum();
         let mut length = (enough - h) / steepness;
-        let climbs = (0..HALVINGS).any(|_| {
+        let climbs = (0..DECISIONS.climb_halvings).any(|_| {
             for (next, (x, g)) in next.iter_mut().zip(x.iter().zip(&gradient)) {
                 *next = x + length * g;
             }

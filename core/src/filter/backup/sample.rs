@@ -2,21 +2,19 @@
 
 use super::choice::{ChoiceMemory, Chosen, Piece, Wish};
 use super::deviation::Deviation;
-use super::first::{First, SHORTER, least_factor};
-use super::planning::{AMPLE, Planning};
-use super::state::{PlanState, Promise};
-use super::{Assurance, AssuranceStatus, Driver, JITTER, Plans};
+use super::first::{First, least_factor};
+use super::planning::Planning;
+use super::settings::DECISIONS;
+use super::state::{PlanState, Promise, round_off};
+use super::{Assurance, AssuranceStatus, Driver, Plans};
 use crate::MAX_INPUTS;
 use crate::convergence::FixedTimeState;
 use crate::filter::integrator::Integrator;
 use crate::filter::rows::{BarrierSlot, End, Rows, Workspace};
 use crate::filter::{Infeasible, Phase, Status};
-use crate::plan::{Failure, ON_TIME, Plan, Planner, SearchProgress, slopes};
+use crate::plan::{Failure, Plan, Planner, SearchProgress, TOLERANCES, slopes};
 use crate::qp::Bounds;
 use crate::scalar::all_finite;
-
-/// How far the plant may deviate from the model in the next hold, in units of the deviation seen in earlier ones.
-const GUSTS: f64 = 1.5;
 
 /// A sample in progress: the rows have answered, and the plans decide.
 pub(super) struct Decision<'a> {
@@ -118,7 +116,7 @@ impl Decision<'_> {
         let planning = self.planning();
         let search = |promises, shorter: &[f64]| planning.first(promises, (t, hold), x, u, shorter);
         let promises = planning.promises(t, x, |_| 1.0);
-        let mut found = search(promises.clone(), &SHORTER).map(|first| (1.0, first));
+        let mut found = search(promises.clone(), &DECISIONS.shorter).map(|first| (1.0, first));
         let yields = |slot: &BarrierSlot| slot.promise.settings().infeasible == Infeasible::Earliest;
         if found.is_err() && planning.rows.slots.iter().any(yields) {
             let promised =
@@ -163,7 +161,7 @@ impl Decision<'_> {
         for ((slot, ((state, before), promise)), b) in slots.iter().zip(states).zip(&mut report.barriers) {
             let settings = slot.promise.settings();
             let later = factor > 1.0 && settings.infeasible == Infeasible::Earliest && b.h < 0.0;
-            state.least_margin = promise.map_or(0.0, |promise| AMPLE * promise.margin);
+            state.least_margin = promise.map_or(0.0, |promise| DECISIONS.ample * promise.margin);
             if !slot.now.in_force || !(later || state.least_margin > settings.margin) {
                 continue;
             }
@@ -223,13 +221,13 @@ impl Decision<'_> {
     fn missed(&self, t: f64, x: &[f64]) -> Option<Failure> {
         let PlanState { status, sample, lost, .. } = self.before();
         let seen = sample.map_or(t, |[last, held]| match status {
-            AssuranceStatus::Assured => last + held * (1.0 + JITTER),
+            AssuranceStatus::Assured => last + held * (1.0 + DECISIONS.jitter),
             // There was a plan, but for a plant that deviates from the model.
-            AssuranceStatus::Lost if lost.is_none() => last + held * (1.0 + JITTER),
+            AssuranceStatus::Lost if lost.is_none() => last + held * (1.0 + DECISIONS.jitter),
             _ => last,
         });
         // A promise covers all times: the same time measured again was not promised.
-        if t <= seen + 2.0 * f64::EPSILON * t.abs() {
+        if t <= seen + round_off(t) {
             return None;
         }
         let promises = self.now().promises.iter().zip(self.planning().models());
@@ -237,7 +235,7 @@ impl Decision<'_> {
             let Promise { from, until, .. } = (*promise)?;
             let h = model.value(t, x);
             // A promise that begins at this sample is checked now.
-            let begins = t - 2.0 * ON_TIME * self.plans.period;
+            let begins = t - 2.0 * TOLERANCES.on_time * self.plans.period;
             match from <= t && t < until {
                 // NaN counts as outside.
                 true if h.is_nan() || h < 0.0 => Some(Failure::Broken { barrier, time: t, slack: h }),
@@ -269,7 +267,7 @@ impl Decision<'_> {
             };
             slopes(model, t, x, &mut slope);
             let falls: f64 = slope.iter().zip(&differs).map(|(slope, differs)| slope.abs() * differs).sum();
-            (kept.margin, kept.reserve, kept.firm) = (GUSTS * falls, 0.0, t);
+            (kept.margin, kept.reserve, kept.firm) = (DECISIONS.gusts * falls, 0.0, t);
         }
         match self.planning().planned(&promises, (t, hold), u, |planner| planner.holds(t, x, u)) {
             Err(Failure::Broken { barrier, time, slack }) => Some(Failure::Drift { barrier, time, slack }),

@@ -2,20 +2,12 @@
 
 use alloc::vec::Vec;
 
+use super::AssuranceStatus;
 use super::choice::ChoiceMemory;
 use super::deviation::Deviation;
-use super::{AssuranceStatus, JITTER};
+use super::settings::DECISIONS;
 use crate::error::{Error, ErrorKind, length};
-use crate::plan::{BackupPlan, Failure, ON_TIME, Plan, SearchProgress};
-
-/// The largest round-off of a time, as a part of the period.
-const ROUND_OFF: f64 = 1e-2;
-/// Part of a hold added to the next one if the clock was not exact.
-const HEADROOM: f64 = 0.02;
-/// Longest interval that counts as shorter than usual, as a part of a hold.
-const QUICKER: f64 = 0.9;
-/// Number of such intervals in a row, equal to within [`JITTER`], that become the new usual ones.
-const ALIKE: u32 = 8;
+use crate::plan::{BackupPlan, Failure, Plan, SearchProgress, TOLERANCES};
 
 /// The part of a [`FilterState`](crate::filter::FilterState) that belongs to plans: the promises and the plan that keeps
 /// them.
@@ -108,12 +100,13 @@ impl PlanState {
         let PlanState { status, sample, alike, interval, .. } = *self;
         let Some([last, held]) = sample else { return period };
         let passed = t - last;
-        let is_same = (passed - held).abs() <= ON_TIME * held + 2.0 * f64::EPSILON * t.abs();
-        let is_usual = passed < QUICKER * held && alike + 1 >= ALIKE && is_like(passed, interval);
+        let is_same = (passed - held).abs() <= TOLERANCES.on_time * held + round_off(t);
+        let is_usual =
+            passed < DECISIONS.quicker * held && alike + 1 >= DECISIONS.alike && is_like(passed, interval);
         match status {
             _ if is_same => held,
             AssuranceStatus::Undecided => period,
-            _ if is_like(passed, held) => held.max((1.0 + HEADROOM) * passed),
+            _ if is_like(passed, held) => held.max((1.0 + DECISIONS.headroom) * passed),
             _ if passed > held && passed.is_finite() || passed > 0.0 && is_usual => passed,
             _ => held,
         }
@@ -123,20 +116,20 @@ impl PlanState {
     /// times are precise enough to distinguish samples.
     pub(super) fn in_time(&self, t: f64, hold: f64) -> bool {
         let Some([last, held]) = self.sample else { return false };
-        let round_off = 2.0 * f64::EPSILON * t.abs();
-        let late = JITTER * held + round_off;
+        let round_off = round_off(t);
+        let late = DECISIONS.jitter * held + round_off;
         // NaN counts as out of time.
-        last <= t && t <= last + held + late && round_off <= ROUND_OFF * hold.min(held)
+        last <= t && t <= last + held + late && round_off <= DECISIONS.distinct * hold.min(held)
     }
 
     /// Whether the plan was made for the sample at `t`.
     pub(super) fn is_regular(&self, t: f64, hold: f64) -> bool {
         let PlanState { plan, sample, .. } = self;
         sample.is_some_and(|[last, held]| {
-            let tolerance = ON_TIME * held + 2.0 * f64::EPSILON * t.abs();
+            let tolerance = TOLERANCES.on_time * held + round_off(t);
             plan.backup_plan.is_uniform
                 && (t == last || t >= last + held - tolerance)
-                && (hold - held).abs() <= ON_TIME * held
+                && (hold - held).abs() <= TOLERANCES.on_time * held
         })
     }
 
@@ -230,5 +223,10 @@ pub(super) struct Promise {
 
 /// Whether two intervals of a measured clock are meant to be the same.
 pub(super) fn is_like(interval: f64, other: f64) -> bool {
-    (interval - other).abs() <= JITTER * other
+    (interval - other).abs() <= DECISIONS.jitter * other
+}
+
+/// Round-off of a difference of the time `t` from another, in s.
+pub(super) fn round_off(t: f64) -> f64 {
+    DECISIONS.time_round_off * t.abs()
 }

@@ -18,10 +18,12 @@
 //! | `perturbed` | a plant near that of the rollout: whether a deviation too small to measure grows |
 //! | `terminal` | the end: whether the plant stays at an equilibrium for ever, or how a plan ends without one |
 //! | `motion` | the extrapolation of motions that have nearly died away |
+//! | `tolerances` | the numbers that decide what is accepted |
 
 mod motion;
 mod perturbed;
 mod terminal;
+mod tolerances;
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -35,34 +37,11 @@ use crate::MAX_INPUTS;
 use crate::interval::Interval;
 use crate::lie::{EXPANSION_ORDERS, Expansion, ExpansionOver, FEW_ORDERS, RateOver};
 use crate::scalar::all_finite;
-use perturbed::{Perturbed, SPREADS};
+use perturbed::Perturbed;
+pub(crate) use tolerances::{CheckTolerances, TOLERANCES};
 
-/// Largest number of pieces of a rollout.
-const MOST_PIECES: u32 = 100_000;
-/// Largest last terms of a state's expansion at the end of a piece, as a part of its size.
-const TRUNCATED: f64 = 1e-10;
-/// Largest residual of a state's expansion over a piece, as a part of 1 plus its change there.
-const RESIDUAL: f64 = 1e-8;
-/// Numbers of coefficients of the rates used to bound this residual: a few first, then all.
+/// Numbers of coefficients of the rates used to bound the residual of a state's expansion: a few first, then all.
 const ORDERS: [usize; 2] = [FEW_ORDERS, EXPANSION_ORDERS - 1];
-/// Growth from a halved piece to the longest next one. For the piece after that it is squared, and so on.
-const LONGER: f64 = 1.2;
-/// The margin at the edge of a set, in units of that inside: a shortfall by round-off is allowed.
-const EDGE: f64 = -1e-6;
-/// Halvings of a piece whose bound does not decide.
-const HALVINGS: u32 = 14;
-/// The number of these that may only sharpen the bound.
-const SHARPER: u32 = 3;
-/// Least bound of a piece that is sharp enough, as a part of the least value seen.
-const SHARP: f64 = 0.8;
-/// Number of instants of a piece at which its expansion is compared with h.
-const INSTANTS: u32 = 4;
-/// Factor on the largest error at these instants, for the times between them.
-const MISSED: f64 = 4.0;
-/// Change of a state over a hold that is round-off, as a part of its size.
-pub(super) const ROUND_OFF: f64 = 16.0 * f64::EPSILON;
-/// Difference of a sample from its time that counts as none, as a part of the period. Round-off of times is separate.
-pub(crate) const ON_TIME: f64 = 1e-6;
 
 /// The samples of a rollout.
 #[derive(Clone, Copy)]
@@ -76,13 +55,14 @@ pub(super) struct Grid {
 impl Grid {
     /// Least time in s by which an end has to lie past a sample: an end that is meant to be the sample does not count.
     pub(super) fn slack(&self) -> f64 {
-        self.period * if self.even { 0.5 } else { ON_TIME }
+        self.period * if self.even { 0.5 } else { TOLERANCES.on_time }
     }
 }
 
 /// A rollout in progress.
 pub(super) struct Walk<'a> {
     model: Model<'a>,
+    tolerances: &'a CheckTolerances,
     requirements: &'a [Requirement<'a>],
     /// Factor on every margin.
     strictness: f64,
@@ -103,7 +83,7 @@ pub(super) struct Walk<'a> {
     /// The longest piece in s to try, and how much longer the next one may be.
     longest: f64,
     growth: f64,
-    perturbed: Perturbed,
+    perturbed: Perturbed<'a>,
     backup_plan: BackupPlan,
     started: f64,
     grid: Grid,
@@ -114,6 +94,7 @@ impl<'a> Walk<'a> {
     /// those of `grid`.
     pub(super) fn new(
         model: Model<'a>,
+        tolerances: &'a CheckTolerances,
         requirements: &'a [Requirement<'a>],
         strictness: f64,
         grid: Grid,
@@ -121,6 +102,7 @@ impl<'a> Walk<'a> {
     ) -> Result<Self, Failure> {
         let mut walk = Self {
             model,
+            tolerances,
             requirements,
             strictness,
             t,
@@ -132,10 +114,10 @@ impl<'a> Walk<'a> {
             rate_over: vec![[Interval::ALL; EXPANSION_ORDERS - 1]; x.len()],
             beside: vec![[0.0; EXPANSION_ORDERS]; x.len()],
             pieces: 0,
-            most_pieces: MOST_PIECES,
+            most_pieces: tolerances.most_pieces,
             longest: f64::INFINITY,
-            growth: LONGER,
-            perturbed: Perturbed::new(x),
+            growth: tolerances.longer,
+            perturbed: Perturbed::new(tolerances, x),
             backup_plan: BackupPlan {
                 rates: vec![0.0; x.len()],
                 is_uniform: grid.even,
@@ -168,7 +150,9 @@ impl<'a> Walk<'a> {
     }
 
     fn margin(&self, i: usize) -> f64 {
-        self.strictness * self.requirements[i].margin * if self.is_firm(i) { 1.0 } else { EDGE }
+        self.strictness
+            * self.requirements[i].margin
+            * if self.is_firm(i) { 1.0 } else { self.tolerances.edge }
     }
 
     /// Whether the margin of requirement `i` has to be there.
@@ -204,8 +188,8 @@ impl<'a> Walk<'a> {
         self.perturbed.u = core::array::from_fn(|i| beside[i] - u[i]);
         self.hold_until_sample(&u[..m], end)?;
         let most = match self.strictness {
-            s if s >= 1.0 => SPREADS[0],
-            s if s > 0.0 => SPREADS[1],
+            s if s >= 1.0 => self.tolerances.spreads[0],
+            s if s > 0.0 => self.tolerances.spreads[1],
             _ => f64::INFINITY,
         };
         if self.perturbed.note(&self.x) <= most { Ok(()) } else { Err(Failure::Unsteady) }
@@ -221,7 +205,8 @@ impl<'a> Walk<'a> {
         let Grid { period, even } = self.grid;
         let samples = ((end - self.started) / period + 0.5) as u64;
         let sample = self.started + samples as f64 * period;
-        let end = if !even || (sample - end).abs() <= ON_TIME * period { end } else { sample };
+        let end =
+            if !even || (sample - end).abs() <= self.tolerances.on_time * period { end } else { sample };
         // Time is too large to distinguish samples.
         if end.is_nan() || end <= self.t {
             return Err(Failure::TooLong);
@@ -269,9 +254,9 @@ impl<'a> Walk<'a> {
         let period = self.grid.period;
         while self.t < end {
             // The next sample. One that is here up to round-off has passed.
-            let passed = ((self.t - self.started) / period + 1e-6) as u64;
+            let passed = ((self.t - self.started) / period + self.tolerances.on_time) as u64;
             let sample = self.started + (passed + 1) as f64 * period;
-            let sample = if sample < end - 1e-6 * period { sample } else { end };
+            let sample = if sample < end - self.tolerances.on_time * period { sample } else { end };
             let (from, to) = (self.x[state], self.x[state] + rate * (sample - self.t));
             let perturbed = 0.5 * (perturbed_rate * (sample - self.t));
             self.x[state] = 0.5 * (from + to);
@@ -301,12 +286,15 @@ impl<'a> Walk<'a> {
             return Err(Failure::Singular);
         }
         let whole = node - self.t;
-        let mut dt = self.path.iter().fold(whole, |dt, c| expansion::reach(c, TRUNCATED * size(c), dt));
+        let mut dt = self
+            .path
+            .iter()
+            .fold(whole, |dt, c| expansion::reach(c, self.tolerances.truncated * size(c), dt));
         // The curvature that shortened the previous piece is still there.
         dt = dt.min(self.longest);
         while !self.is_solution(u, dt) {
             dt *= 0.5;
-            (self.longest, self.growth) = (dt, LONGER);
+            (self.longest, self.growth) = (dt, self.tolerances.longer);
             if self.t + dt <= self.t {
                 return Err(Failure::Singular);
             }
@@ -327,7 +315,7 @@ impl<'a> Walk<'a> {
         let (from, path, over) = (self.t, core::mem::take(&mut self.path), core::mem::take(&mut self.over));
         let mut in_force = (0..self.requirements.len()).filter(|i| self.requirements[*i].is_in_force(from));
         let met = in_force.try_for_each(|i| {
-            let least = self.least(i, (&path, &over), (from, dt), HALVINGS);
+            let least = self.least(i, (&path, &over), (from, dt), self.tolerances.halvings);
             self.note(i, from, least)
         });
         // After a failure nothing is followed further.
@@ -343,11 +331,11 @@ impl<'a> Walk<'a> {
 
     /// Whether the expansions of the states are a solution for `dt` s from their start. Leaves their enclosures.
     fn is_solution(&mut self, u: &[f64], dt: f64) -> bool {
-        let plant = self.model.plant;
+        let (plant, tolerances) = (self.model.plant, self.tolerances);
         self.over.clear();
         self.over.extend(self.path.iter().map(|c| expansion::over(c, dt)));
         // NaN is not small.
-        let is_small = |missed: f64, over: &ExpansionOver| missed * dt <= allowed(over[0]);
+        let is_small = |missed: f64, over: &ExpansionOver| missed * dt <= allowed(tolerances, over[0]);
         for orders in ORDERS {
             if !plant.rates_over(&self.over, u, orders, &mut self.rate_over) {
                 return [0.5 * dt, dt].into_iter().all(|after| {
@@ -384,6 +372,7 @@ impl<'a> Walk<'a> {
         halvings: u32,
     ) -> f64 {
         let (model, margin, needed) = (self.requirements[i].model, self.margin(i), self.least_of(i));
+        let CheckTolerances { instants, missed: factor, sharp, sharper, .. } = *self.tolerances;
         let tightest = self.backup_plan.tightest.map_or(f64::INFINITY, |tightest| tightest.slack);
         // Far from the edge, no more needs to be known.
         let time = Interval::new(from, from + dt);
@@ -394,8 +383,8 @@ impl<'a> Walk<'a> {
         let mut h = [0.0; EXPANSION_ORDERS];
         model.value_along(from, path, &mut h);
         let (mut least, mut missed) = (h[0], 0.0_f64);
-        for k in 1..=INSTANTS {
-            let after = dt * f64::from(k) / f64::from(INSTANTS);
+        for k in 1..=instants {
+            let after = dt * f64::from(k) / f64::from(instants);
             for (x, c) in self.point.iter_mut().zip(path) {
                 *x = at(c, after);
             }
@@ -405,10 +394,11 @@ impl<'a> Walk<'a> {
             }
             (least, missed) = (least.min(value), missed.max((value - at(&h, after)).abs()));
         }
-        let bound = expansion::least(&h, dt) - expansion::last_terms(&h, dt) - MISSED * missed;
+        let bound = expansion::least(&h, dt) - expansion::last_terms(&h, dt) - factor * missed;
         let slack = bound - margin;
-        let is_sharp =
-            slack >= tightest || slack >= SHARP * (least - margin) || halvings + SHARPER <= HALVINGS;
+        let is_sharp = slack >= tightest
+            || slack >= sharp * (least - margin)
+            || halvings + sharper <= self.tolerances.halvings;
         if least < needed {
             // Report the actual shortfall, not what a long piece leaves open.
             return least;
@@ -455,10 +445,11 @@ impl<'a> Walk<'a> {
         self.hold_under(|x, u| reference.input(&model, k, t, x, u), end)
     }
 }
+
 /// The error that a state may have on a piece on which it is within `over`: no more of it far from the origin than near,
 /// except for round-off.
-fn allowed(over: Interval) -> f64 {
-    RESIDUAL * (1.0 + (over.high - over.low)) + ROUND_OFF * over.low.abs()
+fn allowed(tolerances: &CheckTolerances, over: Interval) -> f64 {
+    tolerances.residual * (1.0 + (over.high - over.low)) + tolerances.round_off * over.low.abs()
 }
 
 /// The size of a state, by which the last terms of its expansion are measured.

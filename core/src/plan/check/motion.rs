@@ -4,10 +4,6 @@ use alloc::vec::Vec;
 
 use crate::interval::Interval;
 
-/// Number of intervals between the instants of the extrapolation at which the plant has to be at an equilibrium, and h is
-/// evaluated if it is not enclosed.
-const PATH_INSTANTS: u32 = 32;
-
 /// The extrapolated motion of a number, window by window: a constant creep plus a series that dies away.
 #[derive(Clone, Copy)]
 pub(super) struct Motion {
@@ -66,10 +62,14 @@ fn told_apart([first, before, now]: [f64; 3], round_off: f64) -> Option<[f64; 4]
     })
 }
 
-/// The extrapolated states at instants of the next `windows` windows.
-pub(super) fn states_along(ahead: &[(f64, Motion)], windows: f64) -> impl Iterator<Item = Vec<f64>> {
-    (0..=PATH_INSTANTS).map(move |instant| {
-        let part = f64::from(instant) / f64::from(PATH_INSTANTS);
+/// The extrapolated states at the ends of as many `intervals` of the next `windows` windows.
+pub(super) fn states_along(
+    ahead: &[(f64, Motion)],
+    windows: f64,
+    intervals: u32,
+) -> impl Iterator<Item = Vec<f64>> {
+    (0..=intervals).map(move |instant| {
+        let part = f64::from(instant) / f64::from(intervals);
         ahead.iter().map(|(x, motion)| motion.at(*x, part, windows)).collect()
     })
 }

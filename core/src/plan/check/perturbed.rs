@@ -3,32 +3,19 @@
 
 use alloc::vec::Vec;
 
-use super::Walk;
+use super::{CheckTolerances, Walk};
 use crate::MAX_INPUTS;
 use crate::lie::Expansion;
 use crate::plan::expansion::{self, at};
 use crate::scalar::all_finite;
 
-/// How many times a deviation may grow along a new plan, and along one that was accepted before. It begins with the residual
-/// of the states' expansions, which is far more than round-off.
-pub(super) const SPREADS: [f64; 2] = [1e4, 1e6];
-/// Perturbation of the plant to see how a deviation grows, as a part of a state's size. That size is 1, plus the distance
-/// from where the rollout began, plus a part [`FAR`] of the state itself.
-const PERTURBATION: f64 = 1e-6;
-/// The part of a state that counts in its size: far from the origin a deviation still exceeds round-off, and a position does
-/// not depend on the choice of the origin.
-const FAR: f64 = 1e-6;
-/// Largest last term of a step along which the perturbed plant is followed, as a part of the deviation: (λτ)⁴/4 of a mode
-/// that grows with λ.
-const BENT: f64 = 0.25;
-/// The shortest step, as a part of a piece.
-const SHORTEST: f64 = 1e-3;
 /// The stages of Runge and Kutta: each with its place in the step, its weight, and its weight in the curvature.
 const STAGES: [(f64, f64, f64); 4] =
     [(0.0, 1.0 / 6.0, 1.0), (0.5, 1.0 / 3.0, 0.0), (0.5, 1.0 / 3.0, -2.0), (1.0, 1.0 / 6.0, 1.0)];
 
 /// A perturbed copy of the plant of a rollout, under the same law.
-pub(super) struct Perturbed {
+pub(super) struct Perturbed<'a> {
+    tolerances: &'a CheckTolerances,
     /// The state where the rollout began.
     origin: Vec<f64>,
     /// The difference of its state and of its input.
@@ -42,12 +29,13 @@ pub(super) struct Perturbed {
     grown: f64,
 }
 
-impl Perturbed {
+impl<'a> Perturbed<'a> {
     /// Near `x`, in a direction that is not along an axis.
-    pub(super) fn new(x: &[f64]) -> Self {
+    pub(super) fn new(tolerances: &'a CheckTolerances, x: &[f64]) -> Self {
         Self {
+            tolerances,
             origin: x.to_vec(),
-            x: away(x, x).collect(),
+            x: away(tolerances, x, x).collect(),
             u: [0.0; MAX_INPUTS],
             slope: x.to_vec(),
             mean: x.to_vec(),
@@ -58,40 +46,44 @@ impl Perturbed {
 
     /// Records by how much the difference has grown, at `x`, and rescales it to its original size. Returns that growth.
     pub(super) fn note(&mut self, x: &[f64]) -> f64 {
-        let ratio = part(&self.x, x, &self.origin) / PERTURBATION;
+        let ratio = part(self.tolerances, &self.x, x, &self.origin) / self.tolerances.perturbation;
         self.grown = (self.grown * ratio).max(1.0);
         match ratio > 0.0 && ratio < f64::INFINITY {
             true => self.x.iter_mut().for_each(|d| *d /= ratio),
             // NaN soon shows in the states.
-            false => self.x = away(x, &self.origin).collect(),
+            false => self.x = away(self.tolerances, x, &self.origin).collect(),
         }
         self.grown
     }
 }
 
 /// A deviation from `x` in a direction that is not along an axis.
-fn away(x: &[f64], origin: &[f64]) -> impl Iterator<Item = f64> {
-    let sizes = x.iter().zip(origin).map(|(x, origin)| size_beside(*x, *origin));
+fn away(tolerances: &CheckTolerances, x: &[f64], origin: &[f64]) -> impl Iterator<Item = f64> {
+    let sizes = x.iter().zip(origin).map(|(x, origin)| size_beside(tolerances, *x, *origin));
     (0_u32..)
         .zip(sizes)
-        .map(|(i, size)| (1.0 - 2.0 * f64::from(i % 2)) * PERTURBATION * size / f64::from(1 + i))
+        .map(|(i, size)| (1.0 - 2.0 * f64::from(i % 2)) * tolerances.perturbation * size / f64::from(1 + i))
 }
 
 /// The largest part that a change `d` is of a state's size, at `x`.
-fn part(d: &[f64], x: &[f64], origin: &[f64]) -> f64 {
-    let parts = d.iter().zip(x.iter().zip(origin)).map(|(d, (x, origin))| d.abs() / size_beside(*x, *origin));
+fn part(tolerances: &CheckTolerances, d: &[f64], x: &[f64], origin: &[f64]) -> f64 {
+    let parts = d
+        .iter()
+        .zip(x.iter().zip(origin))
+        .map(|(d, (x, origin))| d.abs() / size_beside(tolerances, *x, *origin));
     parts.fold(0.0, f64::max)
 }
 
 /// The size of a state, to which a deviation is compared.
-fn size_beside(x: f64, origin: f64) -> f64 {
-    1.0 + (x - origin).abs() + FAR * x.abs()
+fn size_beside(tolerances: &CheckTolerances, x: f64, origin: f64) -> f64 {
+    1.0 + (x - origin).abs() + tolerances.far * x.abs()
 }
 
 impl Walk<'_> {
     /// Moves the perturbed plant on by `dt` s, together with the one on `path` under `u`: their difference takes steps of
     /// Runge and Kutta.
     pub(super) fn move_perturbed(&mut self, u: &[f64], path: &[Expansion], dt: f64) {
+        let tolerances = self.tolerances;
         let Perturbed { origin, x: perturbed, u: more, slope, mean, curvature, .. } = &mut self.perturbed;
         let held: [f64; MAX_INPUTS] = core::array::from_fn(|i| u.get(i).map_or(0.0, |u| u + more[i]));
         let (mut from, mut step) = (0.0, dt);
@@ -112,8 +104,8 @@ impl Walk<'_> {
                     curvature[i] += bends * slope[i];
                 }
             }
-            let part = |d: &[f64]| part(d, &self.x, origin);
-            if step * part(curvature) > BENT * part(perturbed) && step > SHORTEST * dt {
+            let part = |d: &[f64]| part(tolerances, d, &self.x, origin);
+            if step * part(curvature) > tolerances.bent * part(perturbed) && step > tolerances.shortest * dt {
                 step *= 0.5;
                 continue;
             }
@@ -136,8 +128,8 @@ impl Walk<'_> {
             let sign = if (self.pieces + i * (self.pieces / 2)).is_multiple_of(2) { 1.0 } else { -1.0 };
             *point = x + sign
                 * self.strictness
-                * PERTURBATION
-                * size_beside(*x, self.perturbed.origin[i as usize]);
+                * self.tolerances.perturbation
+                * size_beside(self.tolerances, *x, self.perturbed.origin[i as usize]);
         }
         self.model.plant.path(&self.point, u, &mut self.beside);
         all_finite(self.beside.as_flattened())

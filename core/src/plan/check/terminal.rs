@@ -5,7 +5,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::motion::{Motion, states_along};
-use super::{ROUND_OFF, Walk, size};
+use super::{CheckTolerances, Walk, size};
 use crate::interval::Interval;
 use crate::lie::EXPANSION_ORDERS;
 use crate::plan::backup_plan::BackupPlan;
@@ -14,47 +14,23 @@ use crate::plan::law::{Reference, StoppingController};
 use crate::plan::model::{differences, largest_eigenvalue};
 use crate::plan::{Failure, Integral, Requirement};
 
-/// Largest rate of a state that counts as an equilibrium, as a part of its largest along the plan.
-const AT_EQUILIBRIUM: f64 = 1e-6;
-/// Number of holds over which a drift at an equilibrium must not leave any set.
-const DRIFT: f64 = 1e3;
-/// Number of holds of the stopping controller over which the remaining motion at an equilibrium is followed.
-const SETTLING: usize = 128;
-/// Halvings of the extrapolated motion of the states at an equilibrium, over which h is enclosed.
-const PATH_HALVINGS: u32 = 6;
-/// Change of h in one window that is round-off, as a part of the numbers that h is computed from.
-const SETTLED: f64 = 64.0 * f64::EPSILON;
-/// Perturbation of a state to see whether a deviation from an equilibrium grows, as a part of its size.
-const BESIDE: f64 = 1e-5;
-/// Largest growth of that deviation, as a part of it, over all the time that is promised.
-const GROWS: f64 = 0.1;
-/// Largest number of pieces in which a hold of the stopping controller at an equilibrium is followed.
-const CREPT: u32 = 1000;
-/// The part of a piece in which a kink is passed.
-const KINK: f64 = 1.0 / 16.0;
-/// The time in s for which a motion that does not die away must not leave any set.
-const LONG: f64 = 1e5;
-/// Largest number of holds of the stopping controller after a reference.
-const STOPPING_HOLDS: usize = 200;
-/// Later times at which a set that does not move has the same h: as parts of the plan's length, and in s.
-const LATER: [[f64; 4]; 2] = [[0.1234, 0.618, 1.7, 3.3], [3.7, 61.7, 1013.0, 86413.0]];
-
 impl Walk<'_> {
     /// Applies the stopping controller until the plant is at an equilibrium where it can stay for ever.
     pub(in crate::plan) fn stop(mut self, stopping: &StoppingController) -> Result<BackupPlan, Failure> {
         let mut u = vec![0.0; self.model.inputs()];
         let hold = stopping.hold.max(self.grid.period);
         let (mut failure, mut due, mut wait) = (Failure::NoRest, 0, 1);
-        for k in 0..STOPPING_HOLDS {
+        for k in 0..self.tolerances.stopping_holds {
             // Only a plant that stands still is followed far ahead. If it did not stay, this is not repeated at every hold.
-            let equilibrium =
-                match self.is_still(stopping, hold, &mut u) && (k >= due || k + 1 == STOPPING_HOLDS) {
-                    true => {
-                        (due, wait) = (k + wait, 2 * wait);
-                        self.stays(stopping, hold, &u)
-                    }
-                    false => Ok(false),
-                };
+            let equilibrium = match self.is_still(stopping, hold, &mut u)
+                && (k >= due || k + 1 == self.tolerances.stopping_holds)
+            {
+                true => {
+                    (due, wait) = (k + wait, 2 * wait);
+                    self.stays(stopping, hold, &u)
+                }
+                false => Ok(false),
+            };
             let model = self.model;
             self.hold_under(|x, u| stopping.input(&model, x, u), self.t + hold)?;
             match equilibrium {
@@ -120,8 +96,9 @@ impl Walk<'_> {
     fn is_still_at_point(&mut self, stopping: &StoppingController, hold: f64, u: &mut [f64]) -> bool {
         stopping.input(&self.model, &self.point, u);
         self.model.plant.rate(&self.point, u, &mut self.rate);
+        let CheckTolerances { at_equilibrium, round_off, .. } = *self.tolerances;
         let small =
-            |i: usize| AT_EQUILIBRIUM * self.backup_plan.rates[i] + ROUND_OFF * self.point[i].abs() / hold;
+            |i: usize| at_equilibrium * self.backup_plan.rates[i] + round_off * self.point[i].abs() / hold;
         self.rate.iter().enumerate().all(|(i, rate)| rate.abs() <= small(i))
     }
 
@@ -138,7 +115,7 @@ impl Walk<'_> {
         let asked = (0..self.requirements.len()).filter(|i| self.requirements[*i].until > self.t);
         let mut seen: Vec<_> = asked.map(|i| (i, vec![h(i, &x)])).collect();
         let mut states = vec![x.clone()];
-        for holds in 1..=SETTLING {
+        for holds in 1..=self.tolerances.settling {
             stopping.input(&self.model, &x, &mut u);
             self.creep(&mut x, &u, hold);
             states.push(x.clone());
@@ -157,12 +134,12 @@ impl Walk<'_> {
             let last = |seen: &dyn Fn(usize) -> f64| [4, 3, 2, 1, 0].map(|back| seen(holds - back * window));
             // The remainder of a plan has to stay only half as long, so that time may pass.
             let windows = |i: usize| {
-                let time = (self.requirements[i].until - self.t).min(LONG * self.strictness);
+                let time = (self.requirements[i].until - self.t).min(self.tolerances.long * self.strictness);
                 time / (hold * window as f64)
             };
             let stays = seen.iter().all(|(i, seen)| {
                 let least = seen.iter().copied().fold(f64::INFINITY, f64::min);
-                let motion = Motion::of(last(&|k| seen[k]), SETTLED * (size + least.abs()));
+                let motion = Motion::of(last(&|k| seen[k]), self.tolerances.settled * (size + least.abs()));
                 motion.is_some_and(|motion| least - motion.to_come(windows(*i)) >= self.least_of(*i))
             });
             if !stays {
@@ -171,7 +148,8 @@ impl Walk<'_> {
             // Two effects have not shown yet: curvature of h farther along the motion of the states, and a state that
             // accelerates.
             let ahead = |j: usize| {
-                let motion = Motion::of(last(&|k| states[k][j]), SETTLED * (size + x[j].abs()));
+                let motion =
+                    Motion::of(last(&|k| states[k][j]), self.tolerances.settled * (size + x[j].abs()));
                 motion.map(|motion| (x[j], motion))
             };
             let Some(ahead) = (0..x.len()).map(ahead).collect::<Option<Vec<_>>>() else { continue };
@@ -180,7 +158,7 @@ impl Walk<'_> {
                 && self.is_equilibrium_ahead(stopping, hold, &ahead, longest)
             {
                 let holds = longest * window as f64;
-                return (self.growth(stopping, hold, &x) - 1.0) * holds <= GROWS;
+                return (self.growth(stopping, hold, &x) - 1.0) * holds <= self.tolerances.grows;
             }
         }
         false
@@ -190,7 +168,7 @@ impl Walk<'_> {
     /// eigenvalue.
     fn growth(&mut self, stopping: &StoppingController, hold: f64, x: &[f64]) -> f64 {
         let mut u = vec![0.0; self.model.inputs()];
-        let moved = differences(x, BESIDE, x.len(), |x| {
+        let moved = differences(x, self.tolerances.beside, x.len(), |x| {
             stopping.input(&self.model, x, &mut u);
             self.creep(x, &u, hold);
         });
@@ -212,18 +190,21 @@ impl Walk<'_> {
     /// kink that breaks them.
     fn creep(&mut self, x: &mut [f64], u: &[f64], duration: f64) {
         let (plant, mut left) = (self.model.plant, duration);
-        for _ in 0..CREPT {
+        for _ in 0..self.tolerances.crept {
             plant.path(x, u, &mut self.path);
             // The faster a motion dies away, the shorter its expansion is.
-            let smooth = self.path.iter().fold(left, |dt, c| expansion::reach(c, ROUND_OFF * size(c), dt));
+            let smooth = self
+                .path
+                .iter()
+                .fold(left, |dt, c| expansion::reach(c, self.tolerances.round_off * size(c), dt));
             let mut dt = smooth;
             let is_followed = loop {
                 self.miss(u, dt);
                 let mut missed = self.rate.iter().zip(&self.path);
-                if missed.all(|(missed, c)| missed * dt <= SETTLED * size(c)) {
+                if missed.all(|(missed, c)| missed * dt <= self.tolerances.settled * size(c)) {
                     break true;
                 }
-                if dt <= KINK * smooth {
+                if dt <= self.tolerances.kink * smooth {
                     break false;
                 }
                 dt *= 0.5;
@@ -250,8 +231,8 @@ impl Walk<'_> {
             h >= self.least_of(i)
         };
         match model.is_still(&self.x) {
-            Some(true) => self.encloses(i, ahead, [0.0, windows], PATH_HALVINGS),
-            _ => states_along(ahead, windows).all(is_met),
+            Some(true) => self.encloses(i, ahead, [0.0, windows], self.tolerances.path_halvings),
+            _ => states_along(ahead, windows, self.tolerances.path_instants).all(is_met),
         }
     }
 
@@ -283,7 +264,7 @@ impl Walk<'_> {
         windows: f64,
     ) -> bool {
         let mut u = vec![0.0; self.model.inputs()];
-        states_along(ahead, windows).all(|x| {
+        states_along(ahead, windows, self.tolerances.path_instants).all(|x| {
             self.point.copy_from_slice(&x);
             self.is_still_at_point(stopping, hold, &mut u)
         })
@@ -292,6 +273,7 @@ impl Walk<'_> {
     /// Whether a plant at an equilibrium here stays in all sets that are required now or later: either they do not move, or
     /// it is known how near they come.
     fn is_equilibrium(&mut self, u: &[f64], hold: f64) -> Result<bool, Failure> {
+        let CheckTolerances { later, unmoved, drift: holds, .. } = *self.tolerances;
         let length = (self.t - self.started).max(self.grid.period);
         self.model.plant.path(&self.x, u, &mut self.path);
         for i in 0..self.requirements.len() {
@@ -300,15 +282,15 @@ impl Walk<'_> {
                 continue;
             }
             let h = requirement.model.value(self.t, &self.x);
-            let mut spans = LATER[0].iter().map(|part| part * length).chain(LATER[1]);
+            let mut spans = later[0].iter().map(|part| part * length).chain(later[1]);
             let moves = spans.any(|span| {
                 let later = requirement.model.value(self.t + span, &self.x);
-                (later - h).abs() > 1e-12 * (1.0 + h.abs())
+                (later - h).abs() > unmoved * (1.0 + h.abs())
             });
             if moves || requirement.model.is_still(&self.x) == Some(false) {
                 let begin = self.t.max(requirement.from);
                 for (x, c) in self.point.iter_mut().zip(&self.path) {
-                    *x = c[0] + c[1] * DRIFT * hold;
+                    *x = c[0] + c[1] * holds * hold;
                 }
                 let lowest = |x: &[f64]| requirement.model.lowest_from(begin, x);
                 let (Some(here), Some(there)) = (lowest(&self.x), lowest(&self.point)) else {
@@ -319,7 +301,7 @@ impl Walk<'_> {
             }
             let mut expansion = [0.0; EXPANSION_ORDERS];
             requirement.model.value_along(self.t, &self.path, &mut expansion);
-            let drift = expansion[1].abs() * (DRIFT * hold).min(requirement.until - self.t);
+            let drift = expansion[1].abs() * (holds * hold).min(requirement.until - self.t);
             self.note(i, self.t.max(requirement.from), h - drift)?;
         }
         Ok(true)

@@ -4,23 +4,15 @@ use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::{Guide, Planner, RESOLVED, ROOM, SEARCHED, UNDATED, WORTH};
+use super::{Guide, Planner};
 use crate::MAX_INPUTS;
 use crate::plan::check::Grid;
 use crate::plan::law::Reference;
 use crate::plan::search::{Descent, Search};
+use crate::plan::settings::{SETTINGS, SearchSettings};
 use crate::plan::{BackupPlan, Failure};
 use crate::plan::{Plan, Requirement};
 use crate::scalar::all_finite;
-
-/// The number of holds of the grid until the last deadline and after it.
-const HOLDS: [usize; 2] = [20, 10];
-/// The number of quadratic programs for which a guess is pursued.
-const FOLLOWED: u32 = 15;
-/// A guess is pursued further if a sample leaves less than this part of its violation.
-const LEFT: f64 = 0.8;
-/// The parts of the time until the last deadline for which a guess holds the wanted input.
-const WANTED: [f64; 2] = [0.35, 0.1];
 
 /// Writes an input at a time in s and a state.
 type Law<'a> = &'a dyn Fn(f64, &[f64], &mut [f64]);
@@ -39,24 +31,26 @@ pub(crate) struct SearchProgress {
 }
 
 impl SearchProgress {
-    /// The number of guesses: one that follows the current plan, some that hold the input itself and then lead to an
-    /// equilibrium, and the first ones of a search.
-    const GUESSES: u32 = 12;
-
     /// Whether it cannot be the progress of a search, has a time or input that is not finite, or a violation that is NaN.
     pub(crate) fn is_flawed(&self) -> bool {
-        self.guess >= Self::GUESSES
+        self.guess >= SETTINGS.renewal_guesses
             || self.violation.is_nan()
             || self.inputs.iter().any(|(end, u)| !end.is_finite() || !all_finite(u))
     }
 
     /// Continues after a sample with `descent` on the grid `times`, or with the next guess. Returns whether there is one.
-    fn next(&mut self, programs: u32, descent: Option<(&Descent, &[f64])>) -> bool {
+    fn next(
+        &mut self,
+        settings: &SearchSettings,
+        programs: u32,
+        descent: Option<(&Descent, &[f64])>,
+    ) -> bool {
+        let SearchSettings { followed, left, renewal_guesses: guesses, .. } = *settings;
         let is_first = self.followed == 0;
         self.followed = self.followed.saturating_add(programs);
         if let Some((Descent { best, .. }, times)) = descent
-            && self.followed < FOLLOWED
-            && best.violation < if is_first { f64::INFINITY } else { LEFT * self.violation }
+            && self.followed < followed
+            && best.violation < if is_first { f64::INFINITY } else { left * self.violation }
         {
             self.violation = best.violation;
             let padded = |u: &Vec<f64>| core::array::from_fn(|i| u.get(i).copied().unwrap_or(0.0));
@@ -64,8 +58,8 @@ impl SearchProgress {
             return true;
         }
         let guess = self.guess + 1;
-        *self = Self { guess: guess % Self::GUESSES, ..Self::default() };
-        guess < Self::GUESSES
+        *self = Self { guess: guess % guesses, ..Self::default() };
+        guess < guesses
     }
 }
 
@@ -119,7 +113,11 @@ impl Planner<'_> {
             None => Err(None),
         };
         found.map_err(|descent| {
-            progress.next(self.programs, descent.as_ref().map(|(descent, times)| (descent, &times[..])))
+            progress.next(
+                self.settings,
+                self.programs,
+                descent.as_ref().map(|(descent, times)| (descent, &times[..])),
+            )
         })
     }
 
@@ -138,8 +136,10 @@ impl Planner<'_> {
         let equilibrium = plan.stopping.as_ref().map(|stopping| stopping.input.clone()).unwrap_or_default();
         match self.step_on(plan, (t, x), &equilibrium, progress) {
             Some(Ok(plan)) => Ok(plan),
-            Some(Err((descent, times))) => Err(progress.next(self.programs, Some((&descent, &times)))),
-            None => Err(progress.next(self.programs, None)),
+            Some(Err((descent, times))) => {
+                Err(progress.next(self.settings, self.programs, Some((&descent, &times))))
+            }
+            None => Err(progress.next(self.settings, self.programs, None)),
         }
     }
 
@@ -151,15 +151,17 @@ impl Planner<'_> {
         wanted: &[f64],
         progress: &SearchProgress,
     ) -> Option<Result<Plan, (Descent, Vec<f64>)>> {
+        let SearchSettings { room, searched, resolved, wanted: parts, worth, .. } = *self.settings;
         let paced = Self { period: self.pace(), ..*self };
         let margin = |r: &Requirement<'_>| match r.is_limit {
-            true => ROOM * r.model.value(t, x).abs(),
-            false => r.margin.max((r.margin + r.reserve) / SEARCHED),
+            true => room * r.model.value(t, x).abs(),
+            false => r.margin.max((r.margin + r.reserve) / searched),
         };
         let requirements: Vec<Requirement<'_>> =
             paced.requirements.iter().map(|r| Requirement { margin: margin(r), ..*r }).collect();
-        let (hold, times) = paced.grid(t, &requirements, (HOLDS, UNDATED), None)?;
-        let sketch = paced.model(paced.resolved(x, hold, RESOLVED[0])?);
+        let (hold, times) =
+            paced.grid(t, &requirements, (self.settings.renewal_holds, self.settings.undated), None)?;
+        let sketch = paced.model(paced.resolved(x, hold, resolved[0])?);
         let (reference, stopping) = (plan.reference.as_ref()?, plan.stopping.as_ref()?);
         let (mut at, mut u, last) = (x.to_vec(), vec![0.0; paced.dims[1]], paced.last(t));
         let mut led = |law: Law<'_>| {
@@ -182,18 +184,18 @@ impl Planner<'_> {
                 Some(k) => reference.input(&sketch, k, t, x, u),
                 None => stopping.input(&sketch, x, u),
             }),
-            k if k <= WANTED.len() => led(&|at, x, u| match at < t + WANTED[k - 1] * (last - t) {
+            k if k <= parts.len() => led(&|at, x, u| match at < t + parts[k - 1] * (last - t) {
                 true => u.copy_from_slice(wanted),
                 false => stopping.input(&sketch, x, u),
             }),
             k => paced
                 .guesses(&sketch, &Guide(Some((**stopping).clone())), x, &times)
-                .nth(k - 1 - WANTED.len())?,
+                .nth(k - 1 - parts.len())?,
         };
         let mut search = Search {
             model: sketch,
             requirements,
-            strictness: SEARCHED,
+            strictness: searched,
             times: &times,
             x,
             size: paced.size,
@@ -201,11 +203,11 @@ impl Planner<'_> {
             quick: true,
             sizes: vec![0.0; self.requirements.len()],
         };
-        let mut descent = Descent::from(search.run(inputs));
+        let mut descent = search.descent(inputs);
         // Half of the programs, a check, and the other half.
         for iterations in [self.programs.div_ceil(2), self.programs / 2] {
             search.improve(&mut descent, iterations);
-            if descent.best.violation > WORTH {
+            if descent.best.violation > worth {
                 continue;
             }
             let gains = search.gains(&mut descent)?;
@@ -220,7 +222,7 @@ impl Planner<'_> {
                 Err(Failure::Broken { barrier, slack, .. }) => search.tighten(barrier, slack, &descent.best),
                 Err(_) => break,
             }
-            descent = Descent::from(search.run(descent.best.inputs.clone()));
+            descent = search.descent(descent.best.inputs.clone());
         }
         Some(Err((descent, times)))
     }
