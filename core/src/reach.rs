@@ -44,12 +44,14 @@ pub(crate) fn ruled_out(
 /// bound.
 ///
 /// ```
+/// use std::sync::Arc;
+///
 /// use punctual_core::barriers::HalfPlane;
 /// use punctual_core::plants::PointMass;
 /// use punctual_core::{lie, qp::Bounds, reach};
 ///
 /// // 9 m from rest with 2 m/s²: 3 s.
-/// let source = lie::along(PointMass, HalfPlane::new([1.0, 0.0], [9.0, 0.0])?, 2)?;
+/// let source = lie::along(Arc::new(PointMass), HalfPlane::new([1.0, 0.0], [9.0, 0.0])?, 2)?;
 /// let mut bounds = Bounds::NONE;
 /// (bounds.min[..2].fill(-2.0), bounds.max[..2].fill(2.0));
 /// let earliest = reach::earliest_arrival(&*source, (0.0, &[0.0; 4]), &bounds, 100.0).expect("known");

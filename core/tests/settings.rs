@@ -110,13 +110,14 @@ fn the_repeated_root_needs_relative_degree_two_or_more() {
 fn wrong_dimensions_are_refused_when_building() {
     let settings = BarrierSettings::within(5.0);
     let dimension = ErrorKind::Dimension;
+    let source = || lie::along(Arc::new(PointMass), distance_disc(), 2).expect("in range");
     refused(
-        Filter::builder(PointMass).barrier("goal", distance_disc(), settings),
+        Filter::from_sources(3, 2).source("goal", source(), settings),
         dimension,
         "goal.x: has 4 components, must have 3",
     );
     refused(
-        Filter::builder(PointMass).barrier("goal", distance_disc(), settings),
+        Filter::from_sources(4, 1).source("goal", source(), settings),
         dimension,
         "goal.u: has 2 components, must have 1",
     );
@@ -132,12 +133,8 @@ fn wrong_dimensions_are_refused_when_building() {
     );
     refused(Filter::from_sources(4, 2).build(), dimension, "barriers: is empty, must have at least 1");
     // More inputs than the library carries: refused, not a panic, also through the bounds.
-    let wide = Filter::builder(PointMass).bounds(&[0.0; 13], &[1.0; 13]).expect("bounds as many as inputs");
-    refused(
-        wide.barrier("goal", distance_disc(), settings),
-        dimension,
-        "goal.u: has 2 components, must have 13",
-    );
+    let wide = Filter::from_sources(4, 33).bounds(&[0.0; 33], &[1.0; 33]).expect("bounds as many as inputs");
+    refused(wide.source("goal", source(), settings), dimension, "goal.u: has 2 components, must have 33");
 }
 
 #[test]
