@@ -412,7 +412,8 @@ fn bounded_box(from: [&[f64]; 2], bounds: [&[f64]; 2], time: [f64; 2]) -> Option
 }
 
 /// Disc of the positions that a vehicle at `from` with the speed `v` can reach until `time`: no further away than
-/// `factor` times the way that the largest acceleration, the first input, gives.
+/// `factor` times the distance that the largest acceleration gives. The acceleration must be the first input; other bounds
+/// are not read.
 fn driven(from: [f64; 2], v: f64, bounds: [&[f64]; 2], time: f64, factor: f64) -> Option<Region> {
     let acceleration = bounds[0][0].abs().max(bounds[1][0].abs());
     if !acceleration.is_finite() || !factor.is_finite() {

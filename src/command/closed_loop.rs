@@ -8,7 +8,7 @@ use punctual_core::filter::{Filter, ProfileKind};
 use punctual_cosim::coupling::Kept;
 use punctual_cosim::error::Error;
 use punctual_fmu::configuration::{
-    Automatic, FilterConfiguration, Functions, ModelName, PlantSection, ProfileName, UNBOUNDED,
+    Automatic, FilterConfiguration, Functions, MethodName, ModelName, PlantSection, ProfileName, UNBOUNDED,
     VariableSection,
 };
 use punctual_reference::effort::{self, CANDIDATES, Candidate, Loop};
@@ -524,6 +524,7 @@ pub(super) fn ratings(
             let Some(deadline) = section.deadline else { continue };
             section.rates.clear();
             section.rate = Automatic(candidate.rate_times_deadline / deadline);
+            section.method = MethodName::ReferenceProfile;
             section.profile = named(candidate.profile);
         }
         for &i in &driven {
@@ -548,8 +549,14 @@ pub(super) fn ratings(
             let Some(deadline) = section.deadline else { continue };
             let rate = candidate.rate_times_deadline / deadline;
             let profile = named(candidate.profile).name();
-            lines
-                .push(format!("# in [[barrier]] {}\nprofile = \"{profile}\"\nrate = {rate:?}", section.name));
+            let method = match section.method {
+                MethodName::ReferenceProfile => "",
+                MethodName::RepeatedRoot => "method = \"reference_profile\"\n",
+            };
+            lines.push(format!(
+                "# in [[barrier]] {}\n{method}profile = \"{profile}\"\nrate = {rate:?}",
+                section.name
+            ));
         }
         if let Some(bound) = bound {
             let bound = written(bound);

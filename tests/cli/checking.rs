@@ -232,6 +232,19 @@ fn the_least_effort_from_a_start() {
         checked.stdout.contains("can be met (this filter does it with that u_ref, simulated)"),
         "{checked:#?}"
     );
+    // A file with another method gets the same table, and the method to paste.
+    workshop.write(
+        "filter.toml",
+        filter.replace("deadline = 10.0", "method = \"repeated_root\"\ndeadline = 10.0"),
+    );
+    let other = workshop.punctual(words).success();
+    let table = |text: &str| {
+        let from = text.find("effort, simulated").expect("a table");
+        text[from..].lines().take(11).map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(table(&other), table(&text));
+    let pasted = "# in [[barrier]] goal\nmethod = \"reference_profile\"\nprofile = \"hermite\"\nrate = 0.5\n";
+    assert!(other.contains(pasted), "{other}");
 }
 
 /// A plan is searched for if every input has bounds, and found if there is enough time.
