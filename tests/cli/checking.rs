@@ -237,7 +237,7 @@ fn the_least_effort_from_a_start() {
         "filter.toml",
         filter.replace("deadline = 10.0", "method = \"repeated_root\"\ndeadline = 10.0"),
     );
-    let other = workshop.punctual(words).success();
+    let other = workshop.punctual(words).stdout;
     let table = |text: &str| {
         let from = text.find("effort, simulated").expect("a table");
         text[from..].lines().take(11).map(str::to_owned).collect::<Vec<_>>()
