@@ -345,7 +345,8 @@ where
     B: Barrier<NX>,
 {
     fn plant(&self) -> PlantId {
-        PlantId::of(&self.plant, [NX, NU])
+        // Beside points in two places it is two plants.
+        PlantId::of(&self.plant, [self.place.components(NX), NU])
     }
 
     fn rooms(&self) -> [Box<dyn Any + Send>; 2] {
@@ -446,7 +447,7 @@ where
 ///
 /// # Errors
 ///
-/// As for [`along`].
+/// As for [`along`]; `first` below `NX`, where the states of the plant are.
 pub fn following<P, B, const NX: usize, const EXTENDED: usize, const NU: usize>(
     plant: Arc<WithPoint<P, NX>>,
     barrier: B,
@@ -457,6 +458,10 @@ where
     P: ControlAffine<NX, NU> + Send + Sync + 'static,
     B: Barrier<EXTENDED> + Send + 'static,
 {
+    if first < NX {
+        let message = format!("is {first}, must be >= {NX}, the number of states of the plant");
+        return Err(Error::new(ErrorKind::Range, "first", message));
+    }
     placed::<_, _, EXTENDED, NU>(plant, barrier, n, Place::new(NX, first))
 }
 

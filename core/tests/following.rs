@@ -102,10 +102,11 @@ fn directions_are_its_own_too() {
 /// derivative of a sample that differences say.
 #[test]
 fn each_barrier_follows_its_own_point() {
-    let beside = || Arc::new(WithPoint::<_, 4>(Unicycle));
+    // One object in two places is two plants.
+    let beside = Arc::new(WithPoint::<_, 4>(Unicycle));
     let clear = |first: usize| {
         let disc = Outside(DistanceDisc::new([0.0, 0.0], 1.0, 1.0).expect("valid disc").following(4));
-        following::<_, _, 4, 8, 2>(beside(), disc, 2, first).expect("in range")
+        following::<_, _, 4, 8, 2>(Arc::clone(&beside), disc, 2, first).expect("in range")
     };
     let goal = DistanceDisc::new([12.0, 5.0], 2.0, 2.0).expect("valid disc");
     let both = || {
@@ -159,6 +160,13 @@ fn derivatives_from_elsewhere_predict_nothing() {
     assert_eq!(source.state_dim(), 7);
     assert!(source.directional().is_some());
     assert!(source.predict().is_none() && source.predict_directional().is_none());
+}
+
+#[test]
+fn a_point_does_not_lie_among_the_states() {
+    let refused = following::<_, _, 4, 8, 2>(Arc::new(WithPoint::<_, 4>(PointMass)), disc(), 2, 3);
+    let message = "first: is 3, must be >= 4, the number of states of the plant";
+    assert_eq!(refused.err().map(|e| e.to_string()).as_deref(), Some(message));
 }
 
 #[test]

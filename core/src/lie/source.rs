@@ -158,7 +158,7 @@ pub struct PlantId {
 }
 
 impl PlantId {
-    /// The identity of `plant`, used with `dims` states and inputs.
+    /// The identity of `plant`, used with so many components of x and inputs.
     pub fn of<P: ?Sized>(plant: &Arc<P>, dims: [usize; 2]) -> Self {
         Self { address: Arc::as_ptr(plant).cast::<()>().addr(), dims }
     }
