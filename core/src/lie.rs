@@ -35,7 +35,7 @@ use crate::barrier::Barrier;
 use crate::dynamics::{ControlAffine, WithPoint, first};
 use crate::error::{Error, ErrorKind};
 use crate::interval::Interval;
-use crate::jet::{Dual, Response, Taylor};
+use crate::jet::{Dual, Response, Tangent, Taylor};
 use crate::scalar::all_finite;
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
@@ -46,7 +46,7 @@ use place::Place;
 pub(crate) use source::FEW_ORDERS;
 pub use source::{
     DerivativeSource, Direction, Directional, EXPANSION_ORDERS, Expansion, ExpansionOver, PlantId, Predict,
-    PredictDirectional, RateOver, SharedPlant,
+    PredictDirectional, RateOver, Second, SharedPlant,
 };
 
 /// The Taylor series of h(t, x(t)) at `t` and `x` with u = 0, `K` coefficients, each with its
@@ -310,6 +310,18 @@ where
 
     fn last_over(&self, time: Interval, path: &[ExpansionOver]) -> Option<Interval> {
         Some(self.place.read::<_, _, NX>(path, |path| ahead::last_over::<B, NX>(&self.barrier, time, path)))
+    }
+
+    fn second_rates(&self, x: &[Second], u: &[Second], out: &mut [Second]) -> bool {
+        let rate = self.plant.derivative(&self.place.take::<_, NX>(x), &from_fn(|m| u[m]));
+        out.fill(Second::from(0.0));
+        self.place.put(&rate, out);
+        true
+    }
+
+    fn second_value(&self, time: Interval, x: &[Second]) -> Option<Second> {
+        let time = Second { value: Tangent { value: time, ..Tangent::from(0.0) }, ..Second::from(0.0) };
+        Some(self.barrier.value(time, &self.place.take::<_, NX>(x)))
     }
 
     fn lowest_held(&self, t: f64, x: &[f64], u: &[f64], duration: f64, wanted: f64) -> Option<f64> {

@@ -12,7 +12,7 @@ use punctual_core::interval::Interval;
 use punctual_core::jet::{Dual, Tangent};
 use punctual_core::lie::{
     Ahead, DerivativeSource, Derivatives, Direction, Directional, EXPANSION_ORDERS, Expansion, ExpansionOver,
-    PlantId, Predict, PredictDirectional, RateOver, RelativeDegree, SharedPlant,
+    PlantId, Predict, PredictDirectional, RateOver, RelativeDegree, Second, SharedPlant,
 };
 use punctual_core::scalar::Scalar;
 
@@ -118,6 +118,7 @@ pub(crate) fn source<E: Equations>(
             value: Along::new(plant, along, 1),
             few_over: Along::new(plant, along, 1),
             expansions_over: Along::new(plant, along, EXPANSION_ORDERS - 1),
+            second: Along::new(plant, along, 1),
             held: vec![[Interval::ALL; 2]; plant.states()],
             rate: vec![0.0; plant.states()],
         };
@@ -375,6 +376,7 @@ struct Work<E, const M: usize> {
     /// For enclosures of h, and of h with its rate.
     few_over: Along<E, Interval>,
     expansions_over: Along<E, Interval>,
+    second: Along<E, Second>,
     /// Enclosures of the states and their rates while an input is held, and the rates at its start.
     held: Vec<[Interval; 2]>,
     rate: Vec<f64>,
@@ -547,6 +549,27 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
         let few_over = &mut self.work.borrow_mut().few_over;
         let h = few_over.follow(time, |i, _| path[i][0]);
         few_over.equations.encloses()[1].then_some(h)
+    }
+
+    fn second_rates(&self, x: &[Second], u: &[Second], out: &mut [Second]) -> bool {
+        let Along { flow: Flow { equations, series, .. }, .. } = &mut self.work.borrow_mut().second;
+        let (own, others) = out.split_at_mut(self.states);
+        for (register, &value) in x[..self.states].iter().chain(u).enumerate() {
+            series.set(register, 0, value);
+        }
+        equations.advance(series, 0);
+        for (i, out) in own.iter_mut().enumerate() {
+            *out = series.get(equations.derivative(i), 0);
+        }
+        others.fill(Second::from(0.0));
+        equations.encloses()[0]
+    }
+
+    fn second_value(&self, time: Interval, x: &[Second]) -> Option<Second> {
+        let second = &mut self.work.borrow_mut().second;
+        let time = Second { value: Tangent { value: time, ..Tangent::from(0.0) }, ..Second::from(0.0) };
+        let h = second.follow(time, |i, k| if k == 0 { x[i] } else { Second::from(0.0) });
+        second.equations.encloses()[1].then_some(h)
     }
 
     fn is_still(&self, x: &[f64]) -> Option<bool> {

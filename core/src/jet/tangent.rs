@@ -1,5 +1,6 @@
 //! Numbers of any kind with their derivative along one direction.
 
+use core::cmp::Ordering;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::derived_operators;
@@ -20,6 +21,12 @@ impl<C: Scalar> Tangent<C> {
     #[inline]
     fn chain(self, value: C, slope: C) -> Self {
         Self { value, directional: self.directional * slope }
+    }
+
+    /// At a kink only the value is known.
+    #[cold]
+    fn kinked(value: C) -> Self {
+        Self { value, directional: C::zero() / C::zero() }
     }
 }
 
@@ -144,6 +151,57 @@ impl<C: Scalar> Scalar for Tangent<C> {
     #[inline]
     fn powf(self, exponent: f64) -> Self {
         self.chain(self.value.powf(exponent), self.value.powf(exponent - 1.0) * exponent)
+    }
+
+    #[inline]
+    fn compare(self, other: Self) -> Option<Ordering> {
+        self.value.compare(other.value)
+    }
+
+    #[inline]
+    fn abs(self) -> Self {
+        match self.compare(Self::from(0.0)) {
+            Some(Ordering::Less) => -self,
+            Some(_) => self,
+            None => Self::kinked(self.value.abs()),
+        }
+    }
+
+    #[inline]
+    fn min(self, other: Self) -> Self {
+        match other.compare(self) {
+            Some(Ordering::Less) => other,
+            Some(_) => self,
+            None => Self::kinked(self.value.min(other.value)),
+        }
+    }
+
+    #[inline]
+    fn max(self, other: Self) -> Self {
+        match other.compare(self) {
+            Some(Ordering::Greater) => other,
+            Some(_) => self,
+            None => Self::kinked(self.value.max(other.value)),
+        }
+    }
+
+    /// Of the two quotients the one that does not exceed 1.
+    #[inline]
+    fn atan2(self, x: Self) -> Self {
+        // Across the negative half of the axis the angle jumps.
+        let side = |s: C| s.compare(C::zero());
+        let value = self.value.atan2(x.value);
+        if side(self.value).is_none() && side(x.value) != Some(Ordering::Greater) {
+            return Self::kinked(value);
+        }
+        let by_y = self.value.abs().compare(x.value.abs()) == Some(Ordering::Greater);
+        let angle = if by_y { -(x / self).atan() } else { (self / x).atan() };
+        Self { value, ..angle }
+    }
+
+    #[inline]
+    fn squared(self) -> Self {
+        self.chain(self.value.squared(), self.value * 2.0)
     }
 }
 

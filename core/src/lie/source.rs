@@ -7,6 +7,7 @@ use core::any::Any;
 use super::{Ahead, Derivatives};
 use crate::MAX_RELATIVE_DEGREE;
 use crate::interval::Interval;
+use crate::jet::Tangent;
 
 /// A source of the derivatives of one barrier. [`along`](super::along()) makes one from the traits,
 /// [`external`](super::external()) takes derivatives that are computed elsewhere, and users can implement their own.
@@ -138,6 +139,17 @@ pub trait Predict {
         None
     }
 
+    /// Writes ẋ with its derivatives along two directions of x and u, on enclosures of them. Returns whether it did. The
+    /// default has none; no plan then accounts for an uncertain plant.
+    fn second_rates(&self, _x: &[Second], _u: &[Second], _out: &mut [Second]) -> bool {
+        false
+    }
+
+    /// h with its derivatives along two directions of x, on enclosures of time (s) and of x. The default has none.
+    fn second_value(&self, _time: Interval, _x: &[Second]) -> Option<Second> {
+        None
+    }
+
     /// Whether h at the state `x` is the same at all times, by its enclosures. The default does not know.
     fn is_still(&self, _x: &[f64]) -> Option<bool> {
         None
@@ -237,3 +249,6 @@ pub struct Direction<'a> {
     /// The direction of the input, or of the reference input, with as many components.
     pub u: &'a [f64],
 }
+
+/// An enclosure of a number, of its derivatives along two directions, and of its second derivative along both.
+pub type Second = Tangent<Tangent<Interval>>;

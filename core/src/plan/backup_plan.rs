@@ -1,7 +1,9 @@
 //! A verified list of held inputs.
 
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 
+use super::tube::Tracking;
 use crate::MAX_INPUTS;
 
 /// A list of held inputs that meets every requirement, from a state on.
@@ -24,6 +26,8 @@ pub struct BackupPlan {
     pub(crate) is_uniform: bool,
     /// The number of pieces of its rollout.
     pub(super) pieces: u32,
+    /// For an uncertain plant: the law that keeps every requirement, along `inputs`.
+    pub(super) tracking: Option<Arc<Tracking>>,
 }
 
 impl BackupPlan {

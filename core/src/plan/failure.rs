@@ -49,6 +49,24 @@ pub enum Failure {
         /// from there on.
         contained: bool,
     },
+    /// The bounds of an input leave too little for the feedback that holds an uncertain plant near the plan.
+    NoReserve {
+        /// The number of the input.
+        input: usize,
+        /// What it lacks, > 0, in its unit.
+        #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+        missing: f64,
+    },
+    /// No bound was found on how far an uncertain plant may be from the plan: it grows without end.
+    Spreads,
+    /// The plant is farther from where the plan expected it than the declared uncertainty allows.
+    Undeclared {
+        /// The number of the state.
+        state: usize,
+        /// How much farther, > 0, in its unit.
+        #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+        beyond: f64,
+    },
     /// A requirement began while no plan was followed, so it is not known whether it was met.
     Missed {
         /// The number of its barrier.
@@ -71,6 +89,16 @@ pub trait Names {
     /// A time in s, without the unit.
     fn time(&self, time: f64) -> String {
         time.to_string()
+    }
+
+    /// The name of an input.
+    fn input(&self, input: usize) -> String {
+        format!("input {input}")
+    }
+
+    /// The name of a state.
+    fn state(&self, state: usize) -> String {
+        format!("state {state}")
     }
 
     /// The statement that no state meets two barriers.
@@ -118,6 +146,19 @@ impl fmt::Display for Named<'_> {
             Failure::Missed { barrier } => {
                 write!(f, "{} came due while no plan was followed", names.barrier(barrier))
             }
+            Failure::NoReserve { input, missing } => write!(
+                f,
+                "the bounds of {} leave too little to hold the uncertain plant near the plan, by {missing}",
+                names.input(input)
+            ),
+            Failure::Spreads => {
+                f.write_str("no feedback holds the uncertain plant near the plan: its deviation grows without end")
+            }
+            Failure::Undeclared { state, beyond } => write!(
+                f,
+                "{} is {beyond} farther from the plan than the declared uncertainty allows",
+                names.state(state)
+            ),
             Failure::NoRest => f.write_str("the plant does not reach an equilibrium, or a set moves"),
             Failure::Unsteady => f.write_str(
                 "the plant is so unstable along the plan that a deviation too small to measure grows until the plan is lost; \

@@ -1,7 +1,7 @@
 //! Plans behind an integrator: the plant receives the mean of an integral over each period.
 
 use crate::interval::Interval;
-use crate::lie::{Ahead, EXPANSION_ORDERS, Expansion, ExpansionOver, Predict, RateOver};
+use crate::lie::{Ahead, EXPANSION_ORDERS, Expansion, ExpansionOver, Predict, RateOver, Second};
 
 /// A state that is the integral of an input. The plant receives its mean over each period, held.
 #[derive(Clone, Copy, Debug)]
@@ -52,6 +52,14 @@ impl Predict for Limit<'_> {
 
     fn value_over(&self, _: Interval, path: &[ExpansionOver]) -> Option<Interval> {
         Some((path[self.state][0] - self.limit) * self.sign)
+    }
+
+    fn second_rates(&self, x: &[Second], u: &[Second], out: &mut [Second]) -> bool {
+        self.plant.second_rates(x, u, out)
+    }
+
+    fn second_value(&self, _: Interval, x: &[Second]) -> Option<Second> {
+        Some((x[self.state] - self.limit) * self.sign)
     }
 
     fn is_still(&self, _: &[f64]) -> Option<bool> {

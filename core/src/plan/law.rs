@@ -302,7 +302,7 @@ fn regulator(
 }
 
 /// One step of the Riccati equation backwards: the price of the state before it, and the gain.
-fn riccati(
+pub(super) fn riccati(
     p: &DMatrix<f64>,
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,

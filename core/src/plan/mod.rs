@@ -16,6 +16,7 @@
 //! | `failure` | messages that say why there is no plan |
 //! | `integral` | the mean of an integral over each period, and its limits |
 //! | `search` | reference trajectories by sequential convex programming |
+//! | `tube` | where an uncertain plant can be along a plan, under a law that holds it there |
 //! | `planner` | which trials are made, in which order, and what is kept between samples |
 //! | `check::tolerances` | the numbers that decide what the check accepts |
 //! | `settings` | the numbers that decide how the search proceeds |
@@ -32,16 +33,20 @@ mod model;
 mod planner;
 mod search;
 mod settings;
+mod tube;
 
 pub use backup_plan::{BackupPlan, Tightest};
 pub(crate) use check::{CheckTolerances, TOLERANCES};
 pub use failure::{Failure, Names};
 pub(crate) use integral::{Integral, Limit};
 pub(crate) use model::slopes;
-pub(crate) use planner::{Planner, SearchProgress};
+pub(crate) use planner::{Planner, SearchProgress, Uncertain, narrowed};
+pub use tube::Tracking;
+pub(crate) use tube::Uncertainty;
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 use crate::lie::Predict;
 use crate::scalar::all_finite;
@@ -88,6 +93,9 @@ pub struct Plan {
     stopping: Option<Arc<StoppingController>>,
     /// The inputs that keep every requirement.
     pub backup_plan: BackupPlan,
+    /// What its nominal inputs leave of their bounds at either side, in their units, for the feedback that an uncertain plant
+    /// needs.
+    pub(crate) reserve: Vec<f64>,
 }
 
 impl Plan {
@@ -113,8 +121,12 @@ impl Plan {
             || self.backup_plan.rates.len() != states
             || !all_finite(&self.backup_plan.rates)
             || self.backup_plan.inputs.is_empty()
+            || self.backup_plan.tracking.as_ref().is_some_and(|tracking| !tracking.fits(states, inputs))
+            || !self.reserve.iter().all(|reserve| reserve.is_finite() && *reserve >= 0.0)
             || match (&self.stopping, &self.reference) {
-                (Some(_), _) => self.backup_plan.until != f64::INFINITY,
+                (Some(_), _) => {
+                    self.backup_plan.until != f64::INFINITY && self.backup_plan.tracking.is_none()
+                }
                 (None, Some(_)) => !self.backup_plan.until.is_finite(),
                 (None, None) => true,
             }

@@ -1,6 +1,7 @@
 //! Which trials are made, in which order, and what is kept between samples.
 
 mod renewal;
+mod robust;
 
 use alloc::sync::Arc;
 use alloc::vec;
@@ -17,6 +18,7 @@ use crate::qp::Bounds;
 use crate::{MAX_INPUTS, elementary};
 
 pub(crate) use renewal::SearchProgress;
+pub(crate) use robust::{Uncertain, narrowed};
 
 /// What a first guess does by default: stop the plant, or, if there is no equilibrium, hold the input nearest to 0.
 struct Guide(Option<StoppingController>);
@@ -92,6 +94,8 @@ pub(crate) struct Planner<'a> {
     before: Option<&'a BackupPlan>,
     /// A plan for other deadlines from which alone a search begins, and the factor from its deadlines to these.
     beside: Option<(&'a Plan, f64)>,
+    /// What is not known of the plant, if anything.
+    uncertain: Option<Uncertain<'a>>,
 }
 
 impl<'a> Planner<'a> {
@@ -123,6 +127,7 @@ impl<'a> Planner<'a> {
             horizon: None,
             before: None,
             beside: None,
+            uncertain: None,
         }
     }
 
@@ -198,6 +203,9 @@ impl<'a> Planner<'a> {
     ///
     /// Why the nearest trial fails.
     pub(crate) fn search(&self, t: f64, x: &[f64]) -> Result<Plan, Failure> {
+        if let Some(uncertain) = self.uncertain {
+            return self.search_robust(uncertain, t, x);
+        }
         let paced = Self { period: self.pace(), ..*self };
         let to = |horizon| paced.search_to(horizon, t, x);
         match (self.horizon, self.before.map(|before| before.until.is_finite())) {
@@ -463,6 +471,7 @@ impl<'a> Planner<'a> {
             reference: Some(Arc::new(reference)),
             stopping: ending.stopping.clone(),
             backup_plan: BackupPlan::default(),
+            reserve: Vec::new(),
         };
         let grid = Grid { period: self.period, even: true };
         let walk = |plan: &Plan| self.walk(plan, 1.0, grid, (times[0], &found.states[0]), None, true);
@@ -484,7 +493,8 @@ impl<'a> Planner<'a> {
 
     /// Whether `plan`, found from `x` at `t` for other requirements, keeps these as strictly as a new plan has to.
     pub(crate) fn keeps(&self, plan: &Plan, t: f64, x: &[f64]) -> bool {
-        self.walk(plan, 1.0, Grid { period: self.period, even: true }, (t, x), None, true).is_ok()
+        let walked = self.walk(plan, 1.0, Grid { period: self.period, even: true }, (t, x), None, true);
+        walked.and_then(|nominal| self.kept(plan, nominal, t, x)).is_ok()
     }
 
     /// A backup plan that begins with `u` for one period from `x` at `t`. Then the reference of `plan` is followed, or the
@@ -494,7 +504,7 @@ impl<'a> Planner<'a> {
     ///
     /// Why the first of these fails.
     pub(crate) fn behind(&self, plan: &Plan, t: f64, x: &[f64], u: &[f64]) -> Result<BackupPlan, Failure> {
-        self.on_a_grid(|grid| {
+        let nominal = self.on_a_grid(|grid| {
             let at = t + self.period;
             let has_reference =
                 plan.reference.as_ref().is_some_and(|r| r.hold_at(at, grid.slack()).is_some());
@@ -506,7 +516,8 @@ impl<'a> Planner<'a> {
                 true => walk(true).or_else(|failure| walk(false).map_err(|_| failure)),
                 false => walk(false),
             }
-        })
+        })?;
+        self.kept(plan, nominal, t, x)
     }
 
     /// The end of `walk`, which has followed the reference of `plan` as far as it goes: at an equilibrium, or at the plan's
@@ -526,6 +537,9 @@ impl<'a> Planner<'a> {
     ///
     /// Why it fails.
     pub(crate) fn tail(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<BackupPlan, Failure> {
+        if let Some(followed) = self.followed(plan, t, x) {
+            return followed;
+        }
         let nu = self.dims[1];
         // Replays `held` of its holds, then applies the law behind it.
         let replay = |grid: Grid, held: usize, follows: bool| {

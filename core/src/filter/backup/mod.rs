@@ -30,9 +30,10 @@ use super::integrator::Integrator;
 use super::rows::{BarrierSlot, Rows};
 use super::{Begin, End, Filter, FilterState, NoDerivative, SampleDerivative};
 use crate::MAX_INPUTS;
-use crate::error::{Error, ErrorKind, positive};
-use crate::lie::{Direction, SharedPlant};
-use crate::plan::{BackupPlan, Policy};
+use crate::error::{Error, ErrorKind, length, non_negative, positive};
+use crate::interval::Interval;
+use crate::lie::{Direction, Second, SharedPlant};
+use crate::plan::{BackupPlan, Policy, Uncertainty};
 use crate::qp::Bounds;
 use choice::Piece;
 pub use planning::Planning;
@@ -52,6 +53,9 @@ pub struct Plans {
     policies: Vec<Policy>,
     /// Pairs of barriers whose sets have no state in common.
     apart: Vec<[usize; 2]>,
+    /// What may be added to the rate of each state, and which part of each input arrives; empty for nothing and all.
+    rates: Vec<f64>,
+    gains: Vec<[f64; 2]>,
 }
 
 impl From<f64> for Plans {
@@ -68,8 +72,15 @@ impl Plans {
 
     /// Plans for inputs that are held for `period` s, finite, > 0.
     pub fn every(period: f64) -> Self {
-        let (policies, apart) = (Vec::new(), Vec::new());
-        Self { period, horizon: None, search_budget: Self::SEARCH_BUDGET, policies, apart }
+        Self {
+            period,
+            horizon: None,
+            search_budget: Self::SEARCH_BUDGET,
+            policies: Vec::new(),
+            apart: Vec::new(),
+            rates: Vec::new(),
+            gains: Vec::new(),
+        }
     }
 
     /// Sets the time in s, finite, > 0, that a plan without an equilibrium at its end has to reach past the last deadline
@@ -98,6 +109,20 @@ impl Plans {
         Self { search_budget: programs, ..self }
     }
 
+    /// Declares what may be added to the rate of each state at any time, finite, ≥ 0, in its unit per s: a wind, a slope, or
+    /// what the model leaves out. Every promise is then kept for all such plants. Default: nothing.
+    #[must_use]
+    pub fn uncertain_rates(self, rates: &[f64]) -> Self {
+        Self { rates: rates.to_vec(), ..self }
+    }
+
+    /// Declares which part of each input arrives, from the least to the largest, 0 < least ≤ largest: constant or not.
+    /// Default: `[1.0, 1.0]` each, all of it.
+    #[must_use]
+    pub fn uncertain_gains(self, gains: &[[f64; 2]]) -> Self {
+        Self { gains: gains.to_vec(), ..self }
+    }
+
     /// Declares that the sets of each pair of barriers, given by their numbers, have no state in common at any time.
     /// Promises that need both at once are then refused without a search ([`Failure::Apart`](crate::plan::Failure::Apart)).
     /// Nothing else depends on it.
@@ -112,6 +137,16 @@ impl Plans {
     fn check(&self) -> Result<(), Error> {
         positive("period", self.period)?;
         self.horizon.map(|horizon| positive("horizon", horizon)).transpose()?;
+        for (i, rate) in self.rates.iter().enumerate() {
+            non_negative(&format!("uncertain_rates[{}]", i + 1), *rate)?;
+        }
+        for (i, [least, most]) in self.gains.iter().enumerate() {
+            let field = format!("uncertain_gains[{}]", i + 1);
+            if positive(&field, *least)? > positive(&field, *most)? {
+                let message = format!("is [{least}, {most}], must be least <= largest");
+                return Err(Error::new(ErrorKind::Range, &field, message));
+            }
+        }
         match self.search_budget {
             0 => Err(Error::new(ErrorKind::Range, "search_budget", "is 0, must be at least 1")),
             _ => Ok(()),
@@ -175,11 +210,12 @@ impl Filter {
         if let Some(obstacle) = self.obstacles(&plans).into_iter().next() {
             return Err(obstacle);
         }
+        let uncertainty = self.uncertainty(&plans)?;
         let mut bounds = self.rows.bounds;
         if let Some(own) = &self.integrator {
             [bounds.min[own.of.input], bounds.max[own.of.input]] = own.rates;
         }
-        self.backup = Some(Box::new(Backup::new(plans, bounds)));
+        self.backup = Some(Box::new(Backup::new(plans, bounds, uncertainty)));
         // A hold that was known before is that of the plans.
         self.expected = self.expected.or(self.rows.expected.take());
         Ok(self)
@@ -193,8 +229,14 @@ impl Filter {
         if rows.delay > 0.0 {
             found.push(refused("actuation_delay", format!("is {}, must be 0 for a plan", rows.delay)));
         }
-        if !rows.errors.is_exact() {
-            found.push(refused("measurement_errors", "are not 0, must be 0 for a plan".into()));
+        let is_uncertain = !(rows.errors.is_exact() && plans.rates.is_empty() && plans.gains.is_empty());
+        if is_uncertain && self.integrator.is_some() {
+            let message = "stands before an uncertain plant, for which no plan accounts yet";
+            found.push(refused("integrator", message.into()));
+        }
+        if is_uncertain && rows.measured > 0 {
+            let message = "follow the states of an uncertain plant, for which no plan accounts yet";
+            found.push(refused("measured", message.into()));
         }
         for slot in &rows.slots {
             let mut refuse =
@@ -222,6 +264,44 @@ impl Filter {
         }
         found.extend(one_plant(rows).err());
         found
+    }
+
+    /// What is not known of the plant, if anything is declared.
+    ///
+    /// # Errors
+    ///
+    /// A slice of the wrong length; a source without derivatives on enclosures.
+    fn uncertainty(&self, plans: &Plans) -> Result<Option<Uncertainty>, Error> {
+        let Rows { state_dim, input_dim, errors, slots, .. } = &self.rows;
+        if !plans.rates.is_empty() {
+            length("uncertain_rates", plans.rates.len(), *state_dim)?;
+        }
+        if !plans.gains.is_empty() {
+            length("uncertain_gains", plans.gains.len(), *input_dim)?;
+        }
+        let (rates, gains) = (plans.rates.iter().copied(), plans.gains.iter().copied());
+        let uncertainty = Uncertainty {
+            rates: rates.chain(core::iter::repeat(0.0)).take(*state_dim).collect(),
+            errors: errors.sizes(*state_dim),
+            gains: gains.chain(core::iter::repeat([1.0; 2])).take(*input_dim).collect(),
+        };
+        if uncertainty.is_nothing() {
+            return Ok(None);
+        }
+        let (x, u) = (alloc::vec![Second::from(0.0); *state_dim], alloc::vec![Second::from(0.0); *input_dim]);
+        let mut rates = x.clone();
+        let lacks = |slot: &&BarrierSlot| {
+            slot.source.predict().is_none_or(|model| {
+                !model.second_rates(&x, &u, &mut rates) || model.second_value(Interval::ALL, &x).is_none()
+            })
+        };
+        match slots.iter().find(lacks) {
+            None => Ok(Some(uncertainty)),
+            Some(slot) => {
+                let message = "has no derivatives on enclosures, which a plan for an uncertain plant needs";
+                Err(Error::new(ErrorKind::Unsupported, "source", message).within(&slot.name))
+            }
+        }
     }
 
     /// Whether the promises are kept, and which source chose the last input; `None` without plans.
@@ -262,6 +342,8 @@ pub(super) struct Backup {
     plans: Plans,
     /// The bounds of the model's inputs; at a sample those of an integrated one are tighter.
     bounds: Bounds,
+    /// What is not known of the plant.
+    uncertainty: Option<Uncertainty>,
     /// The sample that the reports refer to.
     preview: Option<Preview>,
     /// How the input of that sample varies with it.
@@ -280,8 +362,15 @@ struct Preview {
 }
 
 impl Backup {
-    fn new(plans: Plans, bounds: Bounds) -> Self {
-        Self { plans, bounds, preview: None, piece: Piece::ROWS, assurance: Assurance::default() }
+    fn new(plans: Plans, bounds: Bounds, uncertainty: Option<Uncertainty>) -> Self {
+        Self {
+            plans,
+            bounds,
+            uncertainty,
+            preview: None,
+            piece: Piece::ROWS,
+            assurance: Assurance::default(),
+        }
     }
 
     pub(super) fn period(&self) -> f64 {
@@ -289,7 +378,13 @@ impl Backup {
     }
 
     fn planning<'a>(&'a self, (rows, integrator): (&'a Rows, Option<&'a Integrator>)) -> Planning<'a> {
-        Planning { rows, integrator, plans: &self.plans, bounds: &self.bounds }
+        Planning {
+            rows,
+            integrator,
+            plans: &self.plans,
+            bounds: &self.bounds,
+            uncertainty: self.uncertainty.as_ref(),
+        }
     }
 
     /// Whether a plan backs the step at `t`, so that the rows need not be met.
@@ -315,8 +410,9 @@ impl Backup {
     ) {
         let hold = self.planned_hold(hold, integrator.is_some());
         let x = &self.planning((rows, integrator)).state(x)[..];
-        let Self { plans, bounds, assurance, piece, .. } = self;
-        let mut decision = Decision { rows, integrator, plans, bounds, assurance, piece };
+        let Self { plans, bounds, uncertainty, assurance, piece, .. } = self;
+        let uncertainty = uncertainty.as_ref();
+        let mut decision = Decision { rows, integrator, plans, bounds, uncertainty, assurance, piece };
         decision.sample(At { t, hold, x }, u_ref, u);
         rows.workspace.report.assurance = Some(self.assurance);
     }

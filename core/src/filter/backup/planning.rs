@@ -11,7 +11,10 @@ use crate::filter::integrator::{Integrator, insert};
 use crate::filter::rows::{BarrierSlot, Rows};
 use crate::filter::{Begin, End, Integration, Strictness};
 use crate::lie::Predict;
-use crate::plan::{BackupPlan, Failure, Integral, Limit, Planner, Requirement, TOLERANCES, slopes};
+use crate::plan::{
+    BackupPlan, Failure, Integral, Limit, Planner, Requirement, TOLERANCES, Uncertain, Uncertainty, narrowed,
+    slopes,
+};
 use crate::qp::Bounds;
 
 /// The planner of a filter ([`Filter::planning`](crate::filter::Filter::planning)): its barriers along the plant, the
@@ -23,6 +26,8 @@ pub struct Planning<'a> {
     pub(super) plans: &'a Plans,
     /// The bounds of the model's inputs; in the rows those of an integrated one are tighter.
     pub(super) bounds: &'a Bounds,
+    /// What is not known of the plant, if anything is declared.
+    pub(super) uncertainty: Option<&'a Uncertainty>,
 }
 
 impl<'a> Planning<'a> {
@@ -107,8 +112,9 @@ impl<'a> Planning<'a> {
             let from = match (slot.begin, slot.promise.settings().deadline) {
                 (Begin::At(begin), _) if begin > 0.0 => after(begin),
                 // NaN is required at once, so that the check finds it.
-                _ if h.is_nan() || h >= 0.0 => t,
+                _ if h.is_nan() || h >= self.unseen(model, t, x) => t,
                 (_, Some(deadline)) => after(factor(slot) * deadline),
+                (_, None) if h >= 0.0 => t,
                 (_, None) => return None,
             };
             let until = match slot.end {
@@ -126,6 +132,15 @@ impl<'a> Planning<'a> {
             (!soft && until > from).then_some(Promise { from, until, margin, firm, reserve })
         };
         self.rows.slots.iter().zip(self.models()).map(promise).collect()
+    }
+
+    /// By how much h may be lower than at the measured state `x`.
+    fn unseen(&self, model: &dyn Predict, t: f64, x: &[f64]) -> f64 {
+        let Some(Uncertainty { errors, .. }) = self.uncertainty else { return 0.0 };
+        let mut gradient = x.to_vec();
+        slopes(model, t, x, &mut gradient);
+        // Twice, since h may be curved.
+        gradient.iter().zip(errors).map(|(slope, error)| 2.0 * slope.abs() * error).sum()
     }
 
     /// `promises` with each deadline at `part` of its time from `t`. Promises with a begin of their own are unchanged.
@@ -224,8 +239,18 @@ impl<'a> Planning<'a> {
                 reserve: 0.0,
             }
         }));
-        let mut planner =
-            Planner::new(plant, dims, self.bounds, &requirements, period, size).usually(self.plans.period);
+        // The nominal plan leaves what the feedback needs.
+        let bounds = match self.uncertainty {
+            Some(_) => &narrowed(self.bounds, &self.now().plan.reserve),
+            None => self.bounds,
+        };
+        let uncertain = self.uncertainty.map(|of| {
+            let horizon = self.plans.horizon.unwrap_or(DECISIONS.uncertain_horizon);
+            Uncertain { of, bounds: self.bounds, horizon }
+        });
+        let mut planner = Planner::new(plant, dims, bounds, &requirements, period, size)
+            .usually(self.plans.period)
+            .uncertain(uncertain);
         if let Some(integral) = self.integral() {
             planner = planner.integrated(integral);
         }

@@ -12,7 +12,7 @@ use crate::convergence::FixedTimeState;
 use crate::filter::integrator::Integrator;
 use crate::filter::rows::{BarrierSlot, End, Rows, Workspace};
 use crate::filter::{Infeasible, Phase, Status};
-use crate::plan::{Failure, Plan, Planner, SearchProgress, TOLERANCES, slopes};
+use crate::plan::{Failure, Plan, Planner, SearchProgress, TOLERANCES, Uncertainty, slopes};
 use crate::qp::Bounds;
 use crate::scalar::all_finite;
 
@@ -22,6 +22,8 @@ pub(super) struct Decision<'a> {
     pub(super) integrator: Option<&'a Integrator>,
     pub(super) plans: &'a Plans,
     pub(super) bounds: &'a Bounds,
+    /// What is not known of the plant, if anything is declared.
+    pub(super) uncertainty: Option<&'a Uncertainty>,
     pub(super) assurance: &'a mut Assurance,
     /// How the input varies with the sample.
     pub(super) piece: &'a mut Piece,
@@ -37,8 +39,8 @@ pub(super) struct At<'a> {
 
 impl Decision<'_> {
     fn planning(&self) -> Planning<'_> {
-        let Self { rows, integrator, plans, bounds, .. } = self;
-        Planning { rows, integrator: *integrator, plans, bounds }
+        let Self { rows, integrator, plans, bounds, uncertainty, .. } = self;
+        Planning { rows, integrator: *integrator, plans, bounds, uncertainty: *uncertainty }
     }
 
     fn before(&self) -> &PlanState {
@@ -79,6 +81,7 @@ impl Decision<'_> {
         }
         (self.assurance.driver, *self.piece, self.assurance.reason) = (Driver::Rows, Piece::ROWS, None);
         self.release();
+        let undeclared = if is_valid { self.undeclared(at, u) } else { None };
         let is_over = self.now().promises.iter().flatten().all(|promise| promise.until <= t);
         if self.now().status == AssuranceStatus::Assured && !is_over {
             self.assurance.driver = match is_valid {
@@ -95,6 +98,11 @@ impl Decision<'_> {
         if self.now().status == AssuranceStatus::Assured
             && is_valid
             && let Some(failure) = self.exposed(at, u)
+        {
+            self.end(AssuranceStatus::Lost, Some(failure));
+        }
+        if let Some(failure) = undeclared
+            && self.now().status == AssuranceStatus::Assured
         {
             self.end(AssuranceStatus::Lost, Some(failure));
         }
@@ -230,6 +238,10 @@ impl Decision<'_> {
         if t <= seen + round_off(t) {
             return None;
         }
+        // A measured state says less than the plan of an uncertain plant, which covers the time until now.
+        if self.uncertainty.is_some() && *status == AssuranceStatus::Assured {
+            return None;
+        }
         let promises = self.now().promises.iter().zip(self.planning().models());
         promises.enumerate().find_map(|(barrier, (promise, model))| {
             let Promise { from, until, .. } = (*promise)?;
@@ -255,8 +267,23 @@ impl Decision<'_> {
         }
     }
 
+    /// Why the plant is not the one that was declared, if the last plan was for an uncertain one.
+    fn undeclared(&self, At { t, hold, x }: At<'_>, u: &[f64]) -> Option<Failure> {
+        if self.uncertainty.is_none() || self.before().status != AssuranceStatus::Assured {
+            return None;
+        }
+        let planned = self.planning().planned(&self.now().promises, (t, hold), u, |planner| {
+            planner.is_declared(&self.before().plan, t, x)
+        });
+        planned.err().filter(|failure| matches!(failure, Failure::Undeclared { .. }))
+    }
+
     /// What may be missed before the next sample under `u`, if the plant continues to deviate from the model as observed.
     fn exposed(&self, At { t, hold, x }: At<'_>, u: &[f64]) -> Option<Failure> {
+        // Every deviation that was declared is in the plan.
+        if self.uncertainty.is_some() {
+            return None;
+        }
         let mut promises = self.now().promises.clone();
         let differs = self.now().deviation.after(hold, x)?;
         let mut slope = x.to_vec();

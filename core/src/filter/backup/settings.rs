@@ -66,6 +66,10 @@ pub(super) struct DecisionSettings {
     /// The same behind an integrator.
     pub(super) shortest_integrated: f64,
 
+    /// How far in s a plan for an uncertain plant reaches past the last deadline and the sample, if nothing else is asked
+    /// for.
+    pub(super) uncertain_horizon: f64,
+
     // The plant beside its model.
     /// Shortest time over which a deviation is measured, as a part of a period.
     pub(super) stretch: f64,
@@ -154,6 +158,10 @@ pub(super) const DECISIONS: DecisionSettings = DecisionSettings {
     // Plans account for every hold of an integral, so that short ones multiply the cost: up to eight holds for each usual
     // one.
     shortest_integrated: 0.125,
+
+    // The tube of a vehicle at rest grows slowly, and every sample that lets another input pass begins a new one. With more, a
+    // search takes longer; with less, a promise ends sooner if no other input passes any more.
+    uncertain_horizon: 3.0,
 
     // Over less it is round-off: a deviation is a difference of states divided by the time.
     stretch: 0.5,

@@ -46,6 +46,17 @@ impl MeasurementErrors {
         self.directions.is_empty()
     }
 
+    /// The largest error of each of the `states` states.
+    pub(crate) fn sizes(&self, states: usize) -> Vec<f64> {
+        let mut sizes = alloc::vec![0.0; states];
+        for direction in self.directions.chunks_exact(self.state_dim) {
+            for (size, error) in sizes.iter_mut().zip(direction) {
+                *size += error;
+            }
+        }
+        sizes
+    }
+
     /// Number of states with an error.
     pub(crate) fn count(&self) -> usize {
         self.directions.len() / self.state_dim

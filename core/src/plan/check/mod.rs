@@ -25,6 +25,7 @@ mod perturbed;
 mod terminal;
 mod tolerances;
 
+use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -32,6 +33,7 @@ use super::backup_plan::{BackupPlan, Tightest};
 use super::expansion::{self, at, shifted};
 use super::law::Reference;
 use super::model::Model;
+use super::tube::{Piece, Tube};
 use super::{Failure, Integral, Requirement};
 use crate::MAX_INPUTS;
 use crate::interval::Interval;
@@ -84,6 +86,10 @@ pub(super) struct Walk<'a> {
     longest: f64,
     growth: f64,
     perturbed: Perturbed<'a>,
+    /// Where an uncertain plant can be instead. Every requirement then has to be met there, and `falls` says by how much h
+    /// may be lower on the present piece than in the rollout.
+    tube: Option<Box<Tube<'a>>>,
+    falls: Vec<f64>,
     backup_plan: BackupPlan,
     started: f64,
     grid: Grid,
@@ -118,6 +124,8 @@ impl<'a> Walk<'a> {
             longest: f64::INFINITY,
             growth: tolerances.longer,
             perturbed: Perturbed::new(tolerances, x),
+            tube: None,
+            falls: vec![0.0; requirements.len()],
             backup_plan: BackupPlan {
                 rates: vec![0.0; x.len()],
                 is_uniform: grid.even,
@@ -134,6 +142,86 @@ impl<'a> Walk<'a> {
         Ok(walk)
     }
 
+    /// Checks the remainder of the rollout for every plant in `tube`.
+    ///
+    /// # Errors
+    ///
+    /// A requirement in force that such a plant does not meet here.
+    pub(super) fn within(mut self, tube: Tube<'a>) -> Result<Self, Failure> {
+        self.tube = Some(Box::new(tube));
+        for i in 0..self.requirements.len() {
+            if self.requirements[i].is_in_force(self.t) {
+                let (t, x) = (self.t, core::mem::take(&mut self.x));
+                let (requirement, tube) = (&self.requirements[i], self.tube.as_deref_mut());
+                let fall = tube.map_or(0.0, |tube| tube.fall_at((i, requirement), t, &x));
+                let h = requirement.model.value(t, &x);
+                self.x = x;
+                self.note_in_tube(i, t, h - fall, fall)?;
+            }
+        }
+        Ok(self)
+    }
+
+    /// The tube around the rollout.
+    pub(super) fn tube(&mut self) -> Option<&mut Tube<'a>> {
+        self.tube.as_deref_mut()
+    }
+
+    /// The state of the rollout.
+    pub(super) fn state(&self) -> &[f64] {
+        &self.x
+    }
+
+    /// Ends here, at a time that was asked for.
+    pub(super) fn finish(self) -> (BackupPlan, Option<Box<Tube<'a>>>) {
+        (BackupPlan { until: self.t, ..self.backup_plan }, self.tube)
+    }
+
+    /// Holds `u` until `end`, at least one sample ahead, with the feedback `gain` of a measurement here.
+    ///
+    /// # Errors
+    ///
+    /// What is not met.
+    pub(super) fn hold_in_tube(&mut self, u: &[f64], gain: Option<&[f64]>, end: f64) -> Result<(), Failure> {
+        if let Some(tube) = &mut self.tube {
+            tube.hold(u, &self.x, gain)?;
+        }
+        self.hold_until_sample(u, end)
+    }
+
+    /// As [`Self::note`], where h may be lower by `fall` than in the rollout. A tube may record what is not met.
+    fn note_in_tube(&mut self, i: usize, t: f64, h: f64, fall: f64) -> Result<(), Failure> {
+        match (self.note(i, t, h), &mut self.tube) {
+            (Err(failure), Some(tube)) => tube.lack_of(i, fall, failure),
+            (noted, _) => noted,
+        }
+    }
+
+    /// As [`Self::least`] in the tube, and how much lower that may be than in the rollout.
+    fn least_in_tube(
+        &mut self,
+        i: usize,
+        (path, over): (&[Expansion], &[ExpansionOver]),
+        (from, dt): (f64, f64),
+    ) -> [f64; 2] {
+        let Some(tube) = &mut self.tube else {
+            return [self.least(i, (path, over), (from, dt), self.tolerances.halvings), 0.0];
+        };
+        let (requirement, time) = (&self.requirements[i], Interval::new(from, from + dt));
+        let boxed = requirement.model.value_over(time, &tube.around_piece(over));
+        let lowest = boxed.map_or(f64::NEG_INFINITY, |h| h.low);
+        let tightest = self.backup_plan.tightest.map_or(f64::INFINITY, |tightest| tightest.slack);
+        // Far from the edge, no more needs to be known.
+        if lowest >= self.least_of(i) && lowest - self.margin(i) >= tightest {
+            return [lowest, 0.0];
+        }
+        let fall = self.tube.as_mut().map_or(0.0, |tube| tube.fall((i, requirement), time, over));
+        self.falls[i] = fall;
+        let least = self.least(i, (path, over), (from, dt), self.tolerances.halvings) - fall;
+        self.falls[i] = 0.0;
+        [least.max(lowest), fall]
+    }
+
     /// Takes over the rates of the previous plan.
     pub(super) fn after(mut self, before: &BackupPlan) -> Self {
         for (rate, before) in self.backup_plan.rates.iter_mut().zip(&before.rates) {
@@ -146,13 +234,12 @@ impl<'a> Walk<'a> {
     fn least_of(&self, i: usize) -> f64 {
         let is_new = self.strictness >= 1.0 && self.is_firm(i);
         let reserve = if is_new { self.requirements[i].reserve } else { f64::NEG_INFINITY };
-        self.margin(i).max(reserve)
+        self.margin(i).max(reserve + self.falls[i])
     }
 
     fn margin(&self, i: usize) -> f64 {
-        self.strictness
-            * self.requirements[i].margin
-            * if self.is_firm(i) { 1.0 } else { self.tolerances.edge }
+        let firm = if self.is_firm(i) { 1.0 } else { self.tolerances.edge };
+        self.strictness * self.requirements[i].margin * firm + self.falls[i]
     }
 
     /// Whether the margin of requirement `i` has to be there.
@@ -299,7 +386,7 @@ impl<'a> Walk<'a> {
                 return Err(Failure::Singular);
             }
         }
-        if !self.is_smooth_beside(u) {
+        if self.tube.is_none() && !self.is_smooth_beside(u) {
             return Err(Failure::Singular);
         }
         self.longest *= self.growth;
@@ -313,13 +400,20 @@ impl<'a> Walk<'a> {
             *greatest = greatest.max(c[1].abs()).max(expansion::slope(c, dt).abs());
         }
         let (from, path, over) = (self.t, core::mem::take(&mut self.path), core::mem::take(&mut self.over));
+        if let Some(tube) = &mut self.tube {
+            let (plant, tolerances) = (self.model.plant, self.tolerances);
+            let piece = Piece { path: &path, over: &over, dt, u };
+            if !tube.advance(plant, piece, |i| allowed(tolerances, over[i][0])) {
+                return Err(Failure::Spreads);
+            }
+        }
         let mut in_force = (0..self.requirements.len()).filter(|i| self.requirements[*i].is_in_force(from));
         let met = in_force.try_for_each(|i| {
-            let least = self.least(i, (&path, &over), (from, dt), self.tolerances.halvings);
-            self.note(i, from, least)
+            let [least, fall] = self.least_in_tube(i, (&path, &over), (from, dt));
+            self.note_in_tube(i, from, least, fall)
         });
         // After a failure nothing is followed further.
-        if met.is_ok() {
+        if met.is_ok() && self.tube.is_none() {
             self.move_perturbed(u, &path, dt);
         }
         for (x, c) in self.x.iter_mut().zip(&path) {

@@ -135,7 +135,10 @@ impl Planner<'_> {
     ) -> Result<Plan, bool> {
         let equilibrium = plan.stopping.as_ref().map(|stopping| stopping.input.clone()).unwrap_or_default();
         match self.step_on(plan, (t, x), &equilibrium, progress) {
-            Some(Ok(plan)) => Ok(plan),
+            Some(Ok(found)) => match self.kept(plan, found.backup_plan.clone(), t, x) {
+                Ok(backup_plan) => Ok(Plan { backup_plan, ..found }),
+                Err(_) => Err(progress.next(self.settings, self.programs, None)),
+            },
             Some(Err((descent, times))) => {
                 Err(progress.next(self.settings, self.programs, Some((&descent, &times))))
             }

@@ -1,0 +1,235 @@
+//! Plans for an uncertain plant: a nominal plan, a feedback law along it, and the tube that shows what the law keeps.
+//!
+//! A search first leaves a part of every bound to the feedback. The tube around its plan says how much the feedback needs, and
+//! how much h loses; the next search leaves that. A few rounds settle, since the tube hardly depends on the plan.
+
+use alloc::sync::Arc;
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::Planner;
+use crate::MAX_INPUTS;
+use crate::plan::check::{Grid, Walk};
+use crate::plan::tube::{Lacks, Tracking, Tube, Uncertainty, gains};
+use crate::plan::{BackupPlan, Failure, Plan, Requirement};
+use crate::qp::Bounds;
+
+/// What is not known of the plant, its bounds, of which the nominal plan leaves a part, and how far in s a plan has to reach
+/// past the last deadline and the sample.
+#[derive(Clone, Copy)]
+pub(crate) struct Uncertain<'a> {
+    pub(crate) of: &'a Uncertainty,
+    pub(crate) bounds: &'a Bounds,
+    pub(crate) horizon: f64,
+}
+
+/// The part of half the width of its bounds that the first search leaves of an input.
+const FIRST_RESERVE: f64 = 0.2;
+/// The largest part that a search leaves.
+const MOST_RESERVE: f64 = 0.7;
+/// The part of half the width of its bounds at which the feedback of an input has the price 1.
+const FEEDBACK: f64 = 0.25;
+/// Rounds of search and tube.
+const ROUNDS: u32 = 5;
+/// Factor on what the last round lacked, and how much more each round asks for as a part of it.
+const MORE: [f64; 2] = [1.04, 0.05];
+
+impl<'a> Planner<'a> {
+    /// The same planner for an uncertain plant.
+    #[must_use]
+    pub(crate) fn uncertain(self, uncertain: Option<Uncertain<'a>>) -> Self {
+        Self { uncertain, ..self }
+    }
+
+    /// Searches for a plan from `x` at `t` that the uncertain plant keeps.
+    ///
+    /// # Errors
+    ///
+    /// Why the last trial fails.
+    pub(super) fn search_robust(&self, uncertain: Uncertain<'_>, t: f64, x: &[f64]) -> Result<Plan, Failure> {
+        let reach = self.reaches(uncertain);
+        let mut reserve: Vec<f64> = reach.iter().map(|reach| FIRST_RESERVE * reach).collect();
+        let mut raised = vec![0.0; self.requirements.len()];
+        let mut failure = None;
+        for round in 0..ROUNDS {
+            let bounds = narrowed(uncertain.bounds, &reserve);
+            let raise = |(r, more): (&Requirement<'a>, &f64)| match *more > 0.0 {
+                true => Requirement { reserve: r.reserve.max(r.margin) + more, ..*r },
+                false => *r,
+            };
+            let requirements: Vec<Requirement<'_>> =
+                self.requirements.iter().zip(&raised).map(raise).collect();
+            let nominal = Planner { uncertain: None, bounds: &bounds, requirements: &requirements, ..*self };
+            let plan = match nominal.search(t, x) {
+                Ok(plan) => plan,
+                Err(nearest) => return Err(failure.unwrap_or(nearest)),
+            };
+            let lacks = match self.tracked(uncertain, &plan, t, x, true)? {
+                Ok(backup_plan) => return Ok(Plan { backup_plan, reserve, ..plan }),
+                Err(lacks) => lacks,
+            };
+            failure = lacks.failure;
+            let more = MORE[0] + MORE[1] * f64::from(round);
+            for (raised, fall) in raised.iter_mut().zip(&lacks.falls) {
+                *raised = (more * fall).max(*raised);
+            }
+            for (i, reach) in reach.iter().enumerate() {
+                reserve[i] = (more * lacks.feedback[i] + 0.01 * reach).min(MOST_RESERVE * reach);
+            }
+        }
+        Err(failure.unwrap_or(Failure::Spreads))
+    }
+
+    /// `nominal`, a plan from `x` at `t`, with the law that keeps its requirements for the uncertain plant: that of `plan`, if
+    /// it has one.
+    ///
+    /// # Errors
+    ///
+    /// What the first instant lacks that is not met.
+    pub(super) fn kept(
+        &self,
+        plan: &Plan,
+        nominal: BackupPlan,
+        t: f64,
+        x: &[f64],
+    ) -> Result<BackupPlan, Failure> {
+        let Some(uncertain) = self.uncertain else { return Ok(nominal) };
+        let tracking = plan.backup_plan.tracking.clone();
+        let nominal = Plan { backup_plan: BackupPlan { tracking, ..nominal }, ..plan.clone() };
+        self.tracked(uncertain, &nominal, t, x, false)?
+            .map_err(|lacks| lacks.failure.unwrap_or(Failure::Spreads))
+    }
+
+    /// The backup plan of `plan` from `x` at `t`, with the law that keeps every requirement for the uncertain plant. Gains
+    /// are those that it has, if it has any. Its first input needs no feedback, since the state is measured there.
+    ///
+    /// # Errors
+    ///
+    /// Inside: what it lacks, if everything is recorded. Outside: why it ends before.
+    fn tracked(
+        &self,
+        uncertain: Uncertain<'_>,
+        plan: &Plan,
+        t: f64,
+        x: &[f64],
+        records: bool,
+    ) -> Result<Result<BackupPlan, Lacks>, Failure> {
+        let [_, nu] = self.dims;
+        let until = match plan.is_finite() {
+            true => plan.backup_plan.until,
+            false => (self.last(t) + uncertain.horizon).max(self.before.map_or(t, |before| before.until)),
+        };
+        let holds = ((until - t) / self.period * (1.0 - 1e-9)) as usize + 1;
+        if holds > self.settings.most_samples {
+            return Err(Failure::TooLong);
+        }
+        let times: Vec<f64> = (0..=holds).map(|k| t + k as f64 * self.period).collect();
+        let model = self.model(self.period);
+        let (mut z, mut u) = (x.to_vec(), vec![0.0; nu]);
+        let (mut states, mut inputs) = (vec![z.clone()], Vec::with_capacity(holds));
+        let mut planned = plan.backup_plan.inputs.iter().peekable();
+        for hold in times.windows(2) {
+            let middle = 0.5 * (hold[0] + hold[1]);
+            while planned.next_if(|(end, _)| *end < middle).is_some() {}
+            match (planned.peek(), &plan.stopping) {
+                (Some((_, planned)), _) => u.copy_from_slice(&planned[..nu]),
+                (None, Some(stopping)) => stopping.input(&model, &z, &mut u),
+                (None, None) => {}
+            }
+            model.flow(&mut z, &u, hold[1] - hold[0]);
+            inputs.push(u.clone());
+            states.push(z.clone());
+        }
+        let slack = self.tolerances.on_time * self.period;
+        let before = plan.backup_plan.tracking.as_deref();
+        let kept = |k: usize| before.and_then(|before| before.gain_at(times[k], slack)).map(<[f64]>::to_vec);
+        let gains = match before {
+            Some(_) => (0..holds).map(kept).collect::<Option<Vec<_>>>(),
+            None => gains(self.plant, (&times, &states, &inputs), &self.reaches(uncertain), FEEDBACK),
+        };
+        let mut gains = gains.ok_or(Failure::Spreads)?;
+        gains[0].clear();
+        let mut tube = Tube::around(self.plant, uncertain.of, uncertain.bounds, self.dims, self.requirements)
+            .ok_or(Failure::Spreads)?;
+        tube.records = records;
+        let grid = Grid { period: self.period, even: true };
+        let mut walk = Walk::new(model, self.tolerances, self.requirements, 1.0, grid, (t, x))?
+            .after(&plan.backup_plan)
+            .within(tube)?;
+        let mut radii = Vec::with_capacity(holds);
+        states.clear();
+        for k in 0..holds {
+            states.push(walk.state().to_vec());
+            radii.extend(walk.tube().map(|tube| tube.radii().to_vec()));
+            let gain = Some(&gains[k][..]).filter(|gain| !gain.is_empty());
+            walk.hold_in_tube(&inputs[k], gain, times[k + 1])?;
+        }
+        let (backup_plan, tube) = walk.finish();
+        let lacks = tube.map(|tube| tube.lacks).unwrap_or_default();
+        if lacks.failure.is_some() {
+            return Ok(Err(lacks));
+        }
+        let tracking = Tracking { times, inputs, states, gains, radii };
+        Ok(Ok(BackupPlan { tracking: Some(Arc::new(tracking)), ..backup_plan }))
+    }
+
+    /// Whether the plant is at `x` at `t` where the law of `plan` is known to keep it.
+    ///
+    /// # Errors
+    ///
+    /// By how much it is not.
+    pub(crate) fn is_declared(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<(), Failure> {
+        let (Some(uncertain), Some(tracking)) = (self.uncertain, &plan.backup_plan.tracking) else {
+            return Ok(());
+        };
+        let escaped = tracking
+            .at(t, self.tolerances.on_time * self.period)
+            .and_then(|k| tracking.escaped(k, x, &uncertain.of.errors));
+        match escaped {
+            Some((state, beyond)) => Err(Failure::Undeclared { state, beyond }),
+            None => Ok(()),
+        }
+    }
+
+    /// The remainder of `plan` from `x` at `t` by its law, if it has one.
+    ///
+    /// # Errors
+    ///
+    /// It has ended, or the plant is not where it was declared to be.
+    pub(super) fn followed(&self, plan: &Plan, t: f64, x: &[f64]) -> Option<Result<BackupPlan, Failure>> {
+        let (uncertain, tracking) = (self.uncertain?, plan.backup_plan.tracking.as_ref()?);
+        Some(self.is_declared(plan, t, x).and_then(|()| {
+            let slack = self.tolerances.on_time * self.period;
+            let mut inputs = plan.backup_plan.inputs.clone();
+            inputs.retain(|(end, _)| *end > t + slack);
+            if let Some(k) = tracking.at(t, slack) {
+                let mut u = [0.0; MAX_INPUTS];
+                tracking.input(k, x, &mut u[..self.dims[1]]);
+                for (i, u) in u.iter_mut().enumerate().take(self.dims[1]) {
+                    *u = uncertain.bounds.clamp(i, *u);
+                }
+                inputs[0] = (tracking.times[k + 1], u);
+            }
+            match inputs.is_empty() {
+                true => Err(Failure::NoRest),
+                false => Ok(BackupPlan { inputs, ..plan.backup_plan.clone() }),
+            }
+        }))
+    }
+
+    /// Half the widths of the bounds of the inputs.
+    fn reaches(&self, uncertain: Uncertain<'_>) -> Vec<f64> {
+        let planner = Planner { bounds: uncertain.bounds, ..*self };
+        (0..self.dims[1]).map(|i| planner.model(self.period).reach(i, self.size)).collect()
+    }
+}
+
+/// `bounds` without `reserve` at either side.
+pub(crate) fn narrowed(bounds: &Bounds, reserve: &[f64]) -> Bounds {
+    let mut narrowed = *bounds;
+    for (i, reserve) in reserve.iter().enumerate() {
+        narrowed.min[i] += reserve;
+        narrowed.max[i] -= reserve;
+    }
+    narrowed
+}

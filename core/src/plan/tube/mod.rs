@@ -1,0 +1,438 @@
+//! Tubes: where an uncertain plant can be along a plan, under a law that holds it there (docs/theory.md#robust-plan).
+//!
+//! The reference is z(t), under inputs v held for a sample. The law is u = v + K (x̂ − z) at the samples, where the measured
+//! x̂ differs from x by at most the declared errors. Deviations e = x − z and δ = K (x̂ − z) obey
+//!
+//! ```math
+//! \dot e = f(z + e) + g(z + e)(v + \delta) - f(z) - g(z) v + w
+//! = M e + N \delta + \sum_{i \le j} H_{ij} q_{ij} + w, \tag{1}
+//! ```
+//!
+//! with the first derivatives M and N in the middle of a piece of z, the second derivatives H somewhere on it, and with d the
+//! deviation of z from that middle,
+//!
+//! ```math
+//! q_{ii} = d_i e_i + \tfrac{1}{2} e_i^2, \qquad q_{ij} = d_i e_j + d_j e_i + e_i e_j. \tag{2}
+//! ```
+//!
+//! The deviations are enclosed by a zonotope. Each pair (i, j) contributes a generator along the vector H_ij, so that what a
+//! vehicle loses by its heading points across its heading. What is left is a box: the declared rates, the width of H, the
+//! residual of z and round-off. First (1) is bounded on a guess of all deviations on the piece, which is verified (Picard and
+//! Lindelöf).
+//!
+//! | module | owns |
+//! |---|---|
+//! | here | the tube, moved on by a piece |
+//! | `bends` | on what a function depends, and where it is curved |
+//! | `falls` | by how much h may be lower in the tube than along the reference |
+//! | `tracking` | the law: reference, gains and radii, by sample |
+//! | `zonotope` | sets |
+//!
+//! Source: M. Althoff, O. Stursberg and M. Buss, "Reachability analysis of nonlinear systems with uncertain parameters using
+//! conservative linearization", CDC (2008); the generators by pairs are ours.
+
+mod bends;
+mod falls;
+mod tracking;
+mod zonotope;
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::expansion::at;
+use super::{Failure, Requirement};
+use crate::MAX_INPUTS;
+use crate::elementary;
+use crate::interval::Interval;
+use crate::lie::{Expansion, ExpansionOver, Predict, Second};
+use crate::qp::Bounds;
+use crate::scalar::{Scalar, all_finite};
+use bends::{Bends, radius, size};
+pub use tracking::Tracking;
+pub(super) use tracking::gains;
+use zonotope::Zonotope;
+
+/// Largest number of generators. With 40 a unicycle's tube is a half wider than with 160, with 320 a tenth narrower
+/// (docs/theory.md#robust-plan).
+const GENERATORS: usize = 100;
+/// Number of guesses of the deviations on a piece. The second is enough where a piece is short against the plant's motion.
+const GUESSES: u32 = 8;
+/// Part by which a guess exceeds what followed from the one before.
+const WIDER: f64 = 0.02;
+/// The least size of a deviation: far below what any promise resolves, and above round-off.
+const LEAST: f64 = 1e-12;
+/// Round-off of a hundred operations on numbers up to a size, as a part of it.
+const ROUND_OFF: f64 = 1e-13;
+
+/// What is not known of a plant and of its measurements: all that a robust plan accounts for.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Uncertainty {
+    /// What may be added to the rate of each state, at all times, in its unit per s.
+    pub(crate) rates: Vec<f64>,
+    /// How far each state may be from its measured value, in its unit.
+    pub(crate) errors: Vec<f64>,
+    /// Which part of each input arrives, from the least to the largest.
+    pub(crate) gains: Vec<[f64; 2]>,
+}
+
+impl Uncertainty {
+    /// Whether the plant is the model and measured exactly.
+    pub(crate) fn is_nothing(&self) -> bool {
+        self.rates.iter().chain(&self.errors).all(|size| *size == 0.0)
+            && self.gains.iter().all(|gain| *gain == [1.0; 2])
+    }
+}
+
+/// What a plan lacks: the part of every input that the law needs, and what each requirement loses, where one is not met.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Lacks {
+    /// The largest share of the law of each input, in its unit.
+    pub(super) feedback: [f64; MAX_INPUTS],
+    /// The largest loss of h of each requirement where it is not met, in its unit.
+    pub(super) falls: Vec<f64>,
+    /// The first requirement, or input, that is not met.
+    pub(super) failure: Option<Failure>,
+}
+
+/// The deviations of the plant from a reference, at the end of its last piece.
+pub(super) struct Tube<'a> {
+    of: &'a Uncertainty,
+    bounds: &'a Bounds,
+    /// Number of states, and of inputs.
+    dims: [usize; 2],
+    /// Deviations of the states and, behind them, of the inputs while they are held.
+    set: Zonotope,
+    /// The largest deviation on the last piece, and how far one moves there.
+    reach: Vec<f64>,
+    moved: Vec<f64>,
+    /// Whether everything is recorded in `lacks` that is not met. Otherwise the first of it ends the check.
+    pub(super) records: bool,
+    pub(super) lacks: Lacks,
+    plant: Bends,
+    barriers: Vec<Option<Bends>>,
+    rooms: Rooms,
+}
+
+/// Memory of an evaluation.
+#[derive(Default)]
+struct Rooms {
+    variables: Vec<Second>,
+    rates: Vec<Second>,
+    at: Vec<Interval>,
+    slopes: Vec<Interval>,
+    curvatures: Vec<Interval>,
+    scores: Vec<(f64, usize)>,
+    moves: Vec<f64>,
+}
+
+/// A piece of the reference: the expansions of its states and their enclosures, its length in s, and the input held.
+#[derive(Clone, Copy)]
+pub(super) struct Piece<'a> {
+    pub(super) path: &'a [Expansion],
+    pub(super) over: &'a [ExpansionOver],
+    pub(super) dt: f64,
+    pub(super) u: &'a [f64],
+}
+
+impl<'a> Tube<'a> {
+    /// The tube that begins within the errors of measurement around the reference. `None` if the plant has no derivatives on
+    /// enclosures.
+    pub(super) fn around(
+        plant: &dyn Predict,
+        of: &'a Uncertainty,
+        bounds: &'a Bounds,
+        dims: [usize; 2],
+        requirements: &[Requirement<'_>],
+    ) -> Option<Self> {
+        let [n, m] = dims;
+        let bends = Bends::of(n, n + m, |variables, out| {
+            let (x, u) = variables.split_at(n);
+            plant.second_rates(x, u, out)
+        })?;
+        let value = |requirement: &Requirement<'_>| {
+            Bends::of(1, n, |x, out| match requirement.model.second_value(Interval::ALL, x) {
+                Some(h) => {
+                    out[0] = h;
+                    true
+                }
+                None => false,
+            })
+        };
+        let mut tube = Self {
+            of,
+            bounds,
+            dims,
+            set: Zonotope::point(n + m),
+            reach: vec![0.0; n + m],
+            moved: vec![0.0; n],
+            records: false,
+            lacks: Lacks { falls: vec![0.0; requirements.len()], ..Lacks::default() },
+            plant: bends,
+            barriers: requirements.iter().map(value).collect(),
+            rooms: Rooms::default(),
+        };
+        for (i, error) in of.errors.iter().enumerate() {
+            tube.set.push_along(i, *error);
+        }
+        tube.set.reach(&mut tube.reach);
+        Some(tube)
+    }
+
+    /// The largest deviation of every state at the end of the last piece.
+    pub(super) fn radii(&mut self) -> &[f64] {
+        self.set.reach(&mut self.reach);
+        &self.reach[..self.dims[0]]
+    }
+
+    /// Begins a hold of `v` from the reference state `z`, with the feedback `gain` (by input and state) of a measurement
+    /// there; without one the input is `v` alone.
+    ///
+    /// # Errors
+    ///
+    /// An input that leaves its bounds.
+    pub(super) fn hold(&mut self, v: &[f64], z: &[f64], gain: Option<&[f64]>) -> Result<(), Failure> {
+        let ([n, m], most) = (self.dims, GENERATORS);
+        self.set.reach(&mut self.reach);
+        let sizes: Vec<f64> = self.reach[..n].iter().map(|reach| reach.max(LEAST)).collect();
+        self.set.reduce(most, n, &sizes, &mut self.rooms.scores);
+        let Some(gain) = gain else {
+            self.set.map(|column| column[n..].fill(0.0));
+            return Ok(());
+        };
+        self.set.map(|column| {
+            let (e, d) = column.split_at_mut(n);
+            for (d, gain) in d.iter_mut().zip(gain.chunks_exact(n)) {
+                *d = zonotope::dot(gain, e);
+            }
+        });
+        for j in 0..n {
+            // The law itself rounds too.
+            let error = self.of.errors[j] + 8.0 * f64::EPSILON * (z[j].abs() + sizes[j]);
+            let column = (0..n).map(|_| 0.0).chain((0..m).map(|i| gain[i * n + j] * error));
+            self.set.push(column);
+        }
+        self.set.reach(&mut self.reach);
+        for (i, v) in v.iter().enumerate() {
+            let share = self.reach[n + i] * (1.0 + ROUND_OFF);
+            self.lacks.feedback[i] = self.lacks.feedback[i].max(share);
+            let over = (v + share - self.bounds.max[i]).max(self.bounds.min[i] - v + share);
+            // NaN is not within bounds.
+            if !(over <= 0.0) {
+                self.lack(Failure::NoReserve { input: i, missing: over })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Records a failure, or ends the check with it.
+    fn lack(&mut self, failure: Failure) -> Result<(), Failure> {
+        self.lacks.failure.get_or_insert(failure);
+        if self.records { Ok(()) } else { Err(failure) }
+    }
+
+    /// Records that requirement `i` is not met, or ends the check with it.
+    pub(super) fn lack_of(&mut self, i: usize, fall: f64, failure: Failure) -> Result<(), Failure> {
+        self.lacks.falls[i] = self.lacks.falls[i].max(fall);
+        self.lack(failure)
+    }
+
+    /// Moves the tube along `piece`, of which `residual` says how far the state may be from the reference at its end.
+    /// Returns whether a bound was found.
+    pub(super) fn advance(
+        &mut self,
+        model: &dyn Predict,
+        piece: Piece<'_>,
+        residual: impl Fn(usize) -> f64,
+    ) -> bool {
+        let Piece { path, over, dt, u } = piece;
+        let [n, m] = self.dims;
+        let Self { of, set, reach, moved, plant, rooms, .. } = self;
+        let Rooms { variables, rates, at: here, slopes, curvatures, moves, .. } = rooms;
+        rates.resize(n, Second::from(0.0));
+        let evaluate = |variables: &[Second], out: &mut [Second]| {
+            let (x, u) = variables.split_at(n);
+            model.second_rates(x, u, out)
+        };
+        set.reach(reach);
+        // The first derivatives in the middle, and how far the reference is from there.
+        here.clear();
+        here.extend(path.iter().map(|c| Interval::from(at(c, 0.5 * dt))));
+        here.extend(u.iter().map(|u| Interval::from(*u)));
+        plant.slopes(here, (variables, rates), evaluate, slopes);
+        let away: Vec<f64> = (0..n + m)
+            .map(|i| match over.get(i) {
+                Some(over) => (over[0].high - here[i].low).max(here[i].low - over[0].low),
+                None => 0.0,
+            })
+            .collect();
+        let slope = |i: usize, j: usize| slopes[i * (n + m) + j];
+        // What arrives of an input differs from v by `part` times its deviation, by `fixed`, and by at most `spread`.
+        let arrives: Vec<[f64; 3]> = (0..m)
+            .map(|i| {
+                let [least, most] = of.gains[i];
+                let (middle, half) = (0.5 * (least + most), 0.5 * (most - least) * (1.0 + 1e-15));
+                [middle, (middle - 1.0) * u[i], half * (u[i].abs() + reach[n + i])]
+            })
+            .collect();
+        let input = |i: usize, reach: f64| {
+            let [part, fixed, spread] = arrives[i];
+            part.abs() * reach + fixed.abs() + spread
+        };
+        // Bounds on the deviations while the piece lasts: guessed, and verified.
+        let begin: Vec<f64> = (0..n + m)
+            .map(|i| if i < n { reach[i] } else { input(i - n, reach[i]) * (1.0 + ROUND_OFF) })
+            .collect();
+        let mut most: Vec<f64> = begin.clone();
+        let linear =
+            |i: usize, most: &[f64]| (0..n + m).map(|j| slope(i, j).value().abs() * most[j]).sum::<f64>();
+        for i in 0..n {
+            most[i] = (begin[i] + dt * (linear(i, &begin) + of.rates[i])) * (1.0 + WIDER) + LEAST;
+        }
+        let mut others = vec![0.0; n];
+        let mut is_found = false;
+        for _ in 0..GUESSES {
+            for i in 0..n + m {
+                let around = if i < n { over[i][0] } else { here[i] };
+                variables.clear();
+                here[i] = Interval::new(
+                    around.value() - radius(around) - most[i],
+                    around.value() + radius(around) + most[i],
+                );
+            }
+            plant.curvatures(here, (variables, rates), evaluate, curvatures);
+            for i in n..n + m {
+                here[i] = Interval::from(u[i - n]);
+            }
+            for (i, others) in others.iter_mut().enumerate() {
+                let wide: f64 = (0..n + m).map(|j| radius(slope(i, j)) * most[j]).sum();
+                let bent: f64 = (plant.pairs.iter().zip(curvatures.chunks_exact(n)))
+                    .map(|(pair, along)| {
+                        let [fixed, spread] = product(*pair, &away, &most);
+                        size(along[i]) * (fixed + spread)
+                    })
+                    .sum();
+                *others = (wide + bent + of.rates[i] + residual(i) / dt) * (1.0 + ROUND_OFF);
+            }
+            let mut next = most.clone();
+            is_found = true;
+            for i in 0..n {
+                moved[i] = dt * (linear(i, &most) + others[i]) * (1.0 + ROUND_OFF);
+                let wanted = begin[i] + moved[i];
+                is_found &= wanted <= most[i];
+                next[i] = wanted * (1.0 + WIDER) + LEAST;
+            }
+            if is_found || !all_finite(&next) {
+                break;
+            }
+            most = next;
+        }
+        if !is_found {
+            return false;
+        }
+        // The linear part over the piece: e^(M dt), and its integral times N.
+        let drift: Vec<f64> = (0..n * n).map(|k| slope(k / n, k % n).value() * dt).collect();
+        let [flow, integral] = exponential(&drift, n);
+        let driven: Vec<f64> = (0..n * m)
+            .map(|k| {
+                let (i, j) = (k / m, k % m);
+                let along: f64 = (0..n).map(|l| integral[i * n + l] * slope(l, n + j).value()).sum();
+                along * dt * arrives[j][0]
+            })
+            .collect();
+        // What it leaves out: of all powers of M beyond, where |M| dt · most ≤ κ · most.
+        let times = |x: &[f64]| -> Vec<f64> {
+            drift.chunks_exact(n).map(|row| row.iter().zip(x).map(|(a, x)| a.abs() * x).sum()).collect()
+        };
+        let besides: Vec<f64> = (0..n)
+            .map(|i| {
+                let gains: f64 = (0..m).map(|j| slope(i, n + j).value().abs() * arrives[j][2]).sum();
+                dt * (others[i] + gains)
+            })
+            .collect();
+        let kappa = times(&most[..n]).iter().zip(&most).map(|(moved, most)| moved / most).fold(0.0, f64::max);
+        let first = times(&besides);
+        let second = times(&first);
+        let power = |k: i32| elementary::powi(kappa, k);
+        let beyond =
+            elementary::exp(kappa) * (power(5) / 120.0 + power(4) / 120.0 + power(3) / 24.0) + ROUND_OFF;
+        let side = |i: usize| {
+            let wide: f64 = (0..n + m).map(|j| radius(slope(i, j)) * most[j]).sum();
+            let bent: f64 = (plant.pairs.iter().zip(curvatures.chunks_exact(n)))
+                .map(|(pair, along)| {
+                    let [fixed, spread] = product(*pair, &away, &most);
+                    radius(along[i]) * (fixed + spread)
+                })
+                .sum();
+            let spread = dt * (of.rates[i] + wide + bent) + residual(i);
+            (spread + first[i] / 2.0 + second[i] / 6.0) * (1.0 + ROUND_OFF) + beyond * most[i]
+        };
+        let sides: Vec<f64> = (0..n).map(side).collect();
+        // The centre moves by what is not symmetric besides.
+        let shift = |i: usize| {
+            let bent: f64 = (plant.pairs.iter().zip(curvatures.chunks_exact(n)))
+                .map(|(pair, along)| along[i].value() * product(*pair, &away, &most)[0])
+                .sum();
+            let fixed: f64 = (0..m).map(|j| slope(i, n + j).value() * arrives[j][1]).sum();
+            bent + fixed
+        };
+        let shifts: Vec<f64> = (0..n).map(shift).collect();
+        moves.clear();
+        moves.resize(n, 0.0);
+        set.map(|column| {
+            let (e, d) = column.split_at_mut(n);
+            for (i, moved) in moves.iter_mut().enumerate() {
+                *moved = zonotope::dot(&flow[i * n..][..n], e) + zonotope::dot(&driven[i * m..][..m], d);
+            }
+            e.copy_from_slice(moves);
+        });
+        for (i, row) in integral.chunks_exact(n).enumerate() {
+            set.centre[i] += zonotope::dot(row, &shifts) * dt;
+        }
+        for (pair, along) in plant.pairs.iter().zip(curvatures.chunks_exact(n)) {
+            let [_, spread] = product(*pair, &away, &most);
+            set.push(along.iter().map(|along| along.value() * spread * dt));
+        }
+        for (j, [.., spread]) in arrives.iter().enumerate().filter(|(_, [.., spread])| *spread > 0.0) {
+            set.push((0..n).map(|i| slope(i, n + j).value() * spread * dt));
+        }
+        for (i, side) in sides.iter().enumerate() {
+            set.push_along(i, *side);
+        }
+        reach[..n].copy_from_slice(&most[..n]);
+        all_finite(&sides) && all_finite(&set.centre)
+    }
+}
+
+/// (2) on deviations up to `most`, for a reference up to `away` from where the derivatives are taken: its middle, and its
+/// distance from there.
+fn product([i, j]: [usize; 2], away: &[f64], most: &[f64]) -> [f64; 2] {
+    match i == j {
+        true => [0.25 * most[i] * most[i], away[i] * most[i] + 0.25 * most[i] * most[i]],
+        false => [0.0, away[i] * most[j] + away[j] * most[i] + most[i] * most[j]],
+    }
+}
+
+/// The series of e^A and of its mean (e^A − 1)/A to the fourth and third power, for a matrix with `n` rows.
+fn exponential(a: &[f64], n: usize) -> [Vec<f64>; 2] {
+    let identity: Vec<f64> = (0..n * n).map(|k| if k / n == k % n { 1.0 } else { 0.0 }).collect();
+    let (mut power, mut flow, mut integral) = (identity.clone(), identity.clone(), identity);
+    for k in 1..=4_u32 {
+        // A^k / k!.
+        let mut next = vec![0.0; n * n];
+        for i in 0..n {
+            for l in (0..n).filter(|l| power[i * n + l] != 0.0) {
+                for j in 0..n {
+                    next[i * n + j] += power[i * n + l] * a[l * n + j] / f64::from(k);
+                }
+            }
+        }
+        power = next;
+        for (i, power) in power.iter().enumerate() {
+            flow[i] += power;
+            if k < 4 {
+                integral[i] += power / f64::from(k + 1);
+            }
+        }
+    }
+    [flow, integral]
+}
