@@ -27,12 +27,27 @@ pub(crate) struct Uncertain<'a> {
 const FIRST_RESERVE: f64 = 0.2;
 /// The largest part that a search leaves.
 const MOST_RESERVE: f64 = 0.7;
-/// The part of half the width of its bounds at which the feedback of an input has the price 1.
-const FEEDBACK: f64 = 0.25;
 /// Rounds of search and tube.
-const ROUNDS: u32 = 5;
-/// Factor on what the last round lacked, and how much more each round asks for as a part of it.
-const MORE: [f64; 2] = [1.04, 0.05];
+const ROUNDS: u32 = 8;
+/// Factor on what the last round lacked.
+const MORE: f64 = 1.2;
+
+/// What a nominal search is asked for beside the requirements.
+#[derive(Clone)]
+struct Asks {
+    /// The part of every bound that it leaves to the feedback, in the unit of the input.
+    reserve: Vec<f64>,
+    /// How much more margin each requirement gets, in the unit of h.
+    raised: Vec<f64>,
+}
+
+impl Asks {
+    /// Half way to `other`.
+    fn between(&self, other: &Self) -> Self {
+        let half = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| 0.5 * (a + b)).collect();
+        Self { reserve: half(&self.reserve, &other.reserve), raised: half(&self.raised, &other.raised) }
+    }
+}
 
 impl<'a> Planner<'a> {
     /// The same planner for an uncertain plant.
@@ -48,34 +63,47 @@ impl<'a> Planner<'a> {
     /// Why the last trial fails.
     pub(super) fn search_robust(&self, uncertain: Uncertain<'_>, t: f64, x: &[f64]) -> Result<Plan, Failure> {
         let reach = self.reaches(uncertain);
-        let mut reserve: Vec<f64> = reach.iter().map(|reach| FIRST_RESERVE * reach).collect();
-        let mut raised = vec![0.0; self.requirements.len()];
-        let mut failure = None;
-        for round in 0..ROUNDS {
-            let bounds = narrowed(uncertain.bounds, &reserve);
+        // What a round leaves to the feedback, and how much more margin it asks for.
+        let mut asks = Asks {
+            reserve: reach.iter().map(|reach| FIRST_RESERVE * reach).collect(),
+            raised: vec![0.0; self.requirements.len()],
+        };
+        let (mut failure, mut last): (Option<Failure>, Option<Asks>) = (None, None);
+        for _ in 0..ROUNDS {
+            let bounds = narrowed(uncertain.bounds, &asks.reserve);
             let raise = |(r, more): (&Requirement<'a>, &f64)| match *more > 0.0 {
                 true => Requirement { reserve: r.reserve.max(r.margin) + more, ..*r },
                 false => *r,
             };
             let requirements: Vec<Requirement<'_>> =
-                self.requirements.iter().zip(&raised).map(raise).collect();
+                self.requirements.iter().zip(&asks.raised).map(raise).collect();
             let nominal = Planner { uncertain: None, bounds: &bounds, requirements: &requirements, ..*self };
             let plan = match nominal.search(t, x) {
                 Ok(plan) => plan,
-                Err(nearest) => return Err(failure.unwrap_or(nearest)),
+                // Half of the last step may be possible.
+                Err(nearest) => match &last {
+                    Some(last) => {
+                        asks = asks.between(last);
+                        failure.get_or_insert(nearest);
+                        continue;
+                    }
+                    None => return Err(nearest),
+                },
             };
-            let lacks = match self.tracked(uncertain, &plan, t, x, true)? {
-                Ok(backup_plan) => return Ok(Plan { backup_plan, reserve, ..plan }),
-                Err(lacks) => lacks,
+            let (lacks, found) = match self.tracked(uncertain, &plan, t, x, true)? {
+                Ok(backup_plan) => return Ok(Plan { backup_plan, reserve: asks.reserve, ..plan }),
+                Err(lacks) => (lacks, asks.clone()),
             };
             failure = lacks.failure;
-            let more = MORE[0] + MORE[1] * f64::from(round);
-            for (raised, fall) in raised.iter_mut().zip(&lacks.falls) {
-                *raised = (more * fall).max(*raised);
+            for (raised, missing) in asks.raised.iter_mut().zip(&lacks.missing) {
+                *raised += MORE * missing;
             }
-            for (i, reach) in reach.iter().enumerate() {
-                reserve[i] = (more * lacks.feedback[i] + 0.01 * reach).min(MOST_RESERVE * reach);
+            for ((reserve, over), reach) in asks.reserve.iter_mut().zip(&lacks.reserve).zip(&reach) {
+                if *over > 0.0 {
+                    *reserve = (*reserve + MORE * over + 0.01 * reach).min(MOST_RESERVE * reach);
+                }
             }
+            last = Some(found);
         }
         Err(failure.unwrap_or(Failure::Spreads))
     }
@@ -144,21 +172,57 @@ impl<'a> Planner<'a> {
         let before = plan.backup_plan.tracking.as_deref();
         let kept = |k: usize| before.and_then(|before| before.gain_at(times[k], slack)).map(<[f64]>::to_vec);
         let gains = match before {
-            Some(_) => (0..holds).map(kept).collect::<Option<Vec<_>>>(),
-            None => gains(self.plant, (&times, &states, &inputs), &self.reaches(uncertain), FEEDBACK),
+            Some(_) => (0..holds).map(kept).collect::<Option<Vec<_>>>().into_iter().collect(),
+            None => gains(self.plant, (&times, &states, &inputs), &self.reaches(uncertain)),
         };
-        let mut gains = gains.ok_or(Failure::Spreads)?;
-        gains[0].clear();
+        let (mut least, mut failure) = (None, Failure::Spreads);
+        for mut gains in gains {
+            gains[0].clear();
+            let reference =
+                Tracking { times: times.clone(), inputs: inputs.clone(), gains, ..Tracking::default() };
+            match self.checked(uncertain, plan, reference, x, records) {
+                Ok(Ok(backup_plan)) => return Ok(Ok(backup_plan)),
+                Ok(Err(lacks)) => {
+                    let parts = lacks.missing.iter().zip(&lacks.falls).map(|(missing, fall)| missing / fall);
+                    let parts = parts.chain(
+                        lacks.reserve.iter().zip(self.reaches(uncertain)).map(|(over, reach)| over / reach),
+                    );
+                    // Nothing is missing where nothing falls.
+                    let size: f64 = parts.filter(|part| !part.is_nan()).sum();
+                    if least.as_ref().is_none_or(|(before, _)| size < *before) {
+                        least = Some((size, lacks));
+                    }
+                }
+                Err(ends) => failure = ends,
+            }
+        }
+        least.map(|(_, lacks)| Err(lacks)).ok_or(failure)
+    }
+
+    /// The backup plan that follows `law`, whose reference begins at `x`, if every requirement is met in the tube around it.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Self::tracked`].
+    fn checked(
+        &self,
+        uncertain: Uncertain<'_>,
+        plan: &Plan,
+        law: Tracking,
+        x: &[f64],
+        records: bool,
+    ) -> Result<Result<BackupPlan, Lacks>, Failure> {
+        let Tracking { times, inputs, gains, .. } = law;
+        let model = self.model(self.period);
         let mut tube = Tube::around(self.plant, uncertain.of, uncertain.bounds, self.dims, self.requirements)
             .ok_or(Failure::Spreads)?;
         tube.records = records;
         let grid = Grid { period: self.period, even: true };
-        let mut walk = Walk::new(model, self.tolerances, self.requirements, 1.0, grid, (t, x))?
+        let mut walk = Walk::new(model, self.tolerances, self.requirements, 1.0, grid, (times[0], x))?
             .after(&plan.backup_plan)
             .within(tube)?;
-        let mut radii = Vec::with_capacity(holds);
-        states.clear();
-        for k in 0..holds {
+        let (mut states, mut radii) = (Vec::with_capacity(inputs.len()), Vec::with_capacity(inputs.len()));
+        for k in 0..inputs.len() {
             states.push(walk.state().to_vec());
             radii.extend(walk.tube().map(|tube| tube.radii().to_vec()));
             let gain = Some(&gains[k][..]).filter(|gain| !gain.is_empty());

@@ -88,8 +88,11 @@ impl Uncertainty {
 pub(super) struct Lacks {
     /// The largest share of the law of each input, in its unit.
     pub(super) feedback: [f64; MAX_INPUTS],
-    /// The largest loss of h of each requirement where it is not met, in its unit.
+    /// By how much the input of the law is out of its bounds.
+    pub(super) reserve: [f64; MAX_INPUTS],
+    /// The largest loss of h of each requirement where it is not met, and the most that it lacks, in its unit.
     pub(super) falls: Vec<f64>,
+    pub(super) missing: Vec<f64>,
     /// The first requirement, or input, that is not met.
     pub(super) failure: Option<Failure>,
 }
@@ -166,7 +169,11 @@ impl<'a> Tube<'a> {
             reach: vec![0.0; n + m],
             moved: vec![0.0; n],
             records: false,
-            lacks: Lacks { falls: vec![0.0; requirements.len()], ..Lacks::default() },
+            lacks: Lacks {
+                falls: vec![0.0; requirements.len()],
+                missing: vec![0.0; requirements.len()],
+                ..Lacks::default()
+            },
             plant: bends,
             barriers: requirements.iter().map(value).collect(),
             rooms: Rooms::default(),
@@ -218,6 +225,7 @@ impl<'a> Tube<'a> {
             let over = (v + share - self.bounds.max[i]).max(self.bounds.min[i] - v + share);
             // NaN is not within bounds.
             if !(over <= 0.0) {
+                self.lacks.reserve[i] = self.lacks.reserve[i].max(over);
                 self.lack(Failure::NoReserve { input: i, missing: over })?;
             }
         }
@@ -233,6 +241,9 @@ impl<'a> Tube<'a> {
     /// Records that requirement `i` is not met, or ends the check with it.
     pub(super) fn lack_of(&mut self, i: usize, fall: f64, failure: Failure) -> Result<(), Failure> {
         self.lacks.falls[i] = self.lacks.falls[i].max(fall);
+        if let Failure::Broken { slack, .. } = failure {
+            self.lacks.missing[i] = self.lacks.missing[i].max(-slack);
+        }
         self.lack(failure)
     }
 

@@ -6,6 +6,7 @@ use alloc::vec::Vec;
 use nalgebra::{DMatrix, DVector};
 
 use super::bends::{Bends, size};
+use crate::elementary;
 use crate::interval::Interval;
 use crate::lie::{Predict, Second};
 use crate::plan::law::riccati;
@@ -85,82 +86,91 @@ impl Tracking {
 
 /// The length in s over which the inputs show what they can do, for the prices of [`gains`].
 const SIGHT: f64 = 1.0;
+/// The part of the feedback of an input, of half the width of its bounds, that has the price 1.
+const PART: f64 = 0.25;
+/// Factors on the prices of the states that an input moves at once, and of the others, that are tried in turn. With the first
+/// a vehicle is damped; with the second it is held more tightly.
+pub(in crate::plan) const PRICES: [[f64; 2]; 2] = [[2.0, 0.4], [1.0, 1.0]];
+/// A state is moved at once if its rate, for as long as one sees, is at least this part of what moves it in that time.
+const AT_ONCE: f64 = 0.3;
 
 /// The gains of a feedback along a reference with these `times`, `states` and `inputs`, whose inputs have half the widths
-/// `reach`. `part` says which part of that the feedback may take.
+/// `reach`; one set for each of [`PRICES`].
 ///
-/// The price of an input is 1 where it is `part` of its reach. That of a state is 1 where it deviates by what such inputs
-/// move it in [`SIGHT`], in the mean along the reference: √W_ii with the Gramian W. So no price has a unit of its own. The
-/// Riccati equation then runs backwards along the reference.
+/// The price of an input is 1 where it is a part of its reach. That of a state is 1 where it deviates by what such inputs move
+/// it at most in the time one sees: √W_ii with the Gramian W. So no price has a unit of its own. The Riccati equation then
+/// runs backwards along the reference.
 pub(in crate::plan) fn gains(
     plant: &dyn Predict,
     (times, states, inputs): (&[f64], &[Vec<f64>], &[Vec<f64>]),
     reach: &[f64],
-    part: f64,
-) -> Option<Vec<Vec<f64>>> {
-    let (n, m) = (states.first()?.len(), reach.len());
+) -> Vec<Vec<Vec<f64>>> {
+    let (n, m) = (states[0].len(), reach.len());
     let evaluate = |variables: &[Second], out: &mut [Second]| {
         let (x, u) = variables.split_at(n);
         plant.second_rates(x, u, out)
     };
-    let bends = Bends::of(n, n + m, evaluate)?;
+    let Some(bends) = Bends::of(n, n + m, evaluate) else { return Vec::new() };
     let (mut variables, mut rates, mut slopes) = (Vec::new(), vec![Second::from(0.0); n], Vec::new());
     let mut linear = Vec::with_capacity(inputs.len());
     for k in 0..inputs.len() {
-        let next = states.get(k + 1).unwrap_or(&states[k]);
-        let middle = states[k].iter().zip(next).map(|(a, b)| Interval::from(0.5 * (a + b)));
+        let middle = states[k].iter().zip(&states[k + 1]).map(|(a, b)| Interval::from(0.5 * (a + b)));
         let at: Vec<Interval> = middle.chain(inputs[k].iter().map(|u| Interval::from(*u))).collect();
         bends.slopes(&at, (&mut variables, &mut rates), evaluate, &mut slopes);
         if !slopes.iter().all(|slope| size(*slope).is_finite()) {
-            return None;
+            return Vec::new();
         }
         let slope = |i: usize, j: usize| slopes[i * (n + m) + j].value();
         let hold = times[k + 1] - times[k];
-        let a = DMatrix::from_fn(n, n, |i, j| slope(i, j) * hold);
-        let [flow, integral] = super::exponential(a.transpose().as_slice(), n);
-        let b = DMatrix::from_fn(n, m, |i, j| slope(i, n + j) * hold);
-        linear.push((
-            DMatrix::from_row_slice(n, n, &flow),
-            DMatrix::from_row_slice(n, n, &integral) * b,
-            hold,
-        ));
+        let drift: Vec<f64> = (0..n * n).map(|k| slope(k / n, k % n) * hold).collect();
+        let [flow, integral] = super::exponential(&drift, n).map(|rows| DMatrix::from_row_slice(n, n, &rows));
+        let driven = integral * DMatrix::from_fn(n, m, |i, j| slope(i, n + j) * hold);
+        linear.push((flow, driven, hold));
     }
-    let reserve = DVector::from_iterator(m, reach.iter().map(|reach| part * reach));
-    // What the inputs do from sample k on, at a few samples.
-    let (mut prices, mut counted) = (DVector::zeros(n), 0.0);
+    let part = DMatrix::from_diagonal(&DVector::from_iterator(m, reach.iter().map(|reach| PART * reach)));
+    // What the inputs do from a few samples on, and what they do at once.
+    let (mut gramians, mut speeds) = (DVector::zeros(n), DVector::<f64>::zeros(n));
     for k in (0..linear.len()).step_by((linear.len() / 8).max(1)) {
         let (mut gramian, mut at) = (DMatrix::<f64>::zeros(n, n), 0.0);
-        for (a, b, hold) in &linear[k..] {
+        for (flow, driven, hold) in &linear[k..] {
             if at >= SIGHT {
                 break;
             }
-            let driven = b * DMatrix::from_diagonal(&reserve);
-            // Inputs that change all the time: each for a hold, and what is held longer adds up.
-            gramian = a * gramian * a.transpose() + &driven * driven.transpose() * (1.0 / hold);
+            // Inputs that change all the time, as noise does.
+            let driven = driven * &part;
+            speeds = speeds.zip_map(&(driven.column_sum().abs() / *hold), f64::max);
+            gramian = flow * gramian * flow.transpose() + &driven * driven.transpose() / *hold;
             at += hold;
         }
-        if at >= 0.5 * SIGHT || counted == 0.0 {
-            let scale = if at > 0.0 { SIGHT / at.min(SIGHT) } else { 1.0 };
-            prices += gramian.diagonal() * scale;
-            counted += 1.0;
-        }
+        gramians = gramian.diagonal().zip_map(&gramians, f64::max);
     }
-    prices /= counted.max(1.0);
-    let largest = prices.max();
-    // A state that no input moves has no price.
-    let q = DMatrix::from_diagonal(&prices.map(|p| if p > 1e-9 * largest { 1.0 / p } else { 0.0 }));
-    let r = DMatrix::from_diagonal(&reserve.map(|u| 1.0 / (u * u)));
-    let mut p = &q * 10.0;
-    let mut gains = Vec::with_capacity(linear.len());
-    for (a, b, hold) in linear.iter().rev() {
-        let (before, gain) = riccati(&p, a, b, &(&q * *hold), &(&r * *hold))?;
-        p = before;
-        let rows: Vec<f64> = gain.transpose().iter().copied().collect();
-        if !all_finite(&rows) {
-            return None;
-        }
-        gains.push(rows);
-    }
-    gains.reverse();
-    Some(gains)
+    let largest = gramians.max();
+    let r = part.map_diagonal(|part| 1.0 / (part * part));
+    PRICES
+        .iter()
+        .filter_map(|[at_once, later]| {
+            let price = |i: usize| {
+                // A state that no input moves has no price.
+                if gramians[i] <= 1e-9 * largest {
+                    return 0.0;
+                }
+                let is_at_once = speeds[i] * SIGHT >= AT_ONCE * elementary::sqrt(gramians[i] * SIGHT);
+                (if is_at_once { at_once } else { later }) / gramians[i]
+            };
+            let q = DMatrix::from_diagonal(&DVector::from_fn(n, |i, _| price(i)));
+            let (r, mut p) = (DMatrix::from_diagonal(&r), &q * 10.0);
+            let mut gains = Vec::with_capacity(linear.len());
+            for (flow, driven, hold) in linear.iter().rev() {
+                let (before, gain) = riccati(&p, flow, driven, &(&q * *hold), &(&r * *hold))?;
+                p = before;
+                let rows: Vec<f64> = gain.transpose().iter().copied().collect();
+                if !all_finite(&rows) {
+                    return None;
+                }
+                gains.push(rows);
+            }
+            gains.reverse();
+            Some(gains)
+        })
+        .collect()
 }
