@@ -176,7 +176,7 @@ impl Filter {
             if backup.recall(t, hold, x, u_ref, u) {
                 return Ok(());
             }
-            rows.is_backed = backup.is_behind(&rows.state.plan, t, hold, integrator.is_some());
+            rows.is_backed = backup.is_behind(&rows.state.plan, t + rows.delay, hold, integrator.is_some());
         }
         // The rows, on the state of the model.
         match integrator {

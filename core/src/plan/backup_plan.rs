@@ -31,6 +31,11 @@ pub struct BackupPlan {
 }
 
 impl BackupPlan {
+    /// The law that keeps every requirement for an uncertain plant, along `inputs`; `None` if nothing uncertain is declared.
+    pub fn tracking(&self) -> Option<&Tracking> {
+        self.tracking.as_deref()
+    }
+
     /// The mean input from `t` until `end` > `t`.
     pub(super) fn mean(&self, t: f64, end: f64) -> [f64; MAX_INPUTS] {
         let (mut mean, mut at) = ([0.0; MAX_INPUTS], t);

@@ -26,9 +26,11 @@ impl Planning<'_> {
     ///
     /// Why the nearest trial fails.
     pub fn plan_from(&self, t: f64, x: &[f64], factor: f64) -> Result<BackupPlan, Failure> {
-        let x = &self.state(x)[..];
-        let promises = self.promises(t, x, |_| factor);
-        self.first(promises, (t, self.plans.period), x, &[], &DECISIONS.shorter)
+        let measured = self.state(x);
+        let own = Planning { measured: Some((t, &measured)), ..*self };
+        let (t, x) = self.acts(t, &measured);
+        let promises = self.promises(t, &x, |_| factor);
+        own.first(promises, (t, self.plans.period), &x, &[], &DECISIONS.shorter)
             .map(|first| first.plan.backup_plan)
     }
 
@@ -40,9 +42,11 @@ impl Planning<'_> {
         x: &[f64],
         longest: f64,
     ) -> (Result<BackupPlan, Failure>, Option<(f64, BackupPlan)>) {
-        let state = &self.state(x)[..];
-        let promises = self.promises(t, state, |_| 1.0);
-        match self.first(promises, (t, self.plans.period), state, &[], &DECISIONS.shorter) {
+        let measured = self.state(x);
+        let own = Planning { measured: Some((t, &measured)), ..*self };
+        let (acts, state) = self.acts(t, &measured);
+        let promises = self.promises(acts, &state, |_| 1.0);
+        match own.first(promises, (acts, self.plans.period), &state, &[], &DECISIONS.shorter) {
             Ok(first) => (Ok(first.plan.backup_plan.clone()), self.least(t, x, longest, Some(first))),
             Err(failure) => (Err(failure), self.least(t, x, longest, None)),
         }
@@ -51,7 +55,8 @@ impl Planning<'_> {
     /// Whether a first sample at `t` and `x` could promise each barrier. Not promised are: a soft barrier, one that ends
     /// before its deadline, and one without a deadline that begins at once and whose set does not contain `x`.
     pub fn promised(&self, t: f64, x: &[f64]) -> impl Iterator<Item = bool> + use<> {
-        self.promises(t, &self.state(x), |_| 1.0).into_iter().map(|promise| promise.is_some())
+        let (t, x) = self.acts(t, &self.state(x));
+        self.promises(t, &x, |_| 1.0).into_iter().map(|promise| promise.is_some())
     }
 
     /// The least factor by which every deadline has to be multiplied so that a plan from `x` at `t` is found, and that plan.
@@ -76,7 +81,13 @@ impl Planning<'_> {
         x: &[f64],
         step: f64,
     ) -> Vec<(f64, Vec<f64>, [f64; MAX_INPUTS])> {
-        self.along(backup_plan, t, &self.state(x), step)
+        let x = self.state(x);
+        let (acts, begin) = self.acts(t, &x);
+        let mut trajectory = self.along(backup_plan, acts, &begin, step);
+        if acts > t {
+            trajectory.insert(0, (t, x, self.rows.acting()));
+        }
+        trajectory
     }
 
     /// [`Self::earliest_deadline`]; `first` was found for the deadlines themselves.
@@ -87,18 +98,21 @@ impl Planning<'_> {
         longest: f64,
         first: Option<First>,
     ) -> Option<(f64, BackupPlan)> {
-        let x = &self.state(x)[..];
+        let measured = self.state(x);
+        let own = Planning { measured: Some((t, &measured)), ..*self };
+        let (t, x) = self.acts(t, &measured);
+        let x = &x[..];
         let promised = |factor: f64| self.promises(t, x, |_| factor);
         let arrived = |factor: f64, First { promises, plan, .. }: First| {
-            (factor * self.arrival(&promises, &plan, t, x), plan)
+            (factor * own.arrival(&promises, &plan, t, x), plan)
         };
         let find = |factor: f64| {
-            let found = self.first(promised(factor), (t, self.plans.period), x, &[], &[]).ok()?;
+            let found = own.first(promised(factor), (t, self.plans.period), x, &[], &[]).ok()?;
             Some(arrived(factor, found))
         };
         let sooner = |factor: f64, (before, plan): &(f64, Plan)| {
             let found =
-                self.beside(promised(factor), (t, self.plans.period), x, &[], plan, factor / before).ok()?;
+                own.beside(promised(factor), (t, self.plans.period), x, &[], plan, factor / before).ok()?;
             Some(arrived(factor, found))
         };
         let found = first.map(|first| arrived(1.0, first));
@@ -192,7 +206,9 @@ impl Planning<'_> {
                 h.is_nan() || h < least
             });
             let arrival = outside.last().and_then(|(k, _)| trajectory.get(k + 1)).map_or(t, |(at, ..)| *at);
-            part = part.max((arrival - t) / (promise.from - t));
+            // Deadlines count from the sample.
+            let sample = t - self.rows.delay;
+            part = part.max((arrival - sample) / (promise.from - sample));
         }
         let keeps = |part: f64| {
             let sooner = self.sooner(promises, t, part);

@@ -56,6 +56,8 @@ pub struct Plans {
     /// What may be added to the rate of each state, and which part of each input arrives; empty for nothing and all.
     rates: Vec<f64>,
     gains: Vec<[f64; 2]>,
+    /// How far each state may be from its measured value; empty if the rows know.
+    errors: Vec<f64>,
 }
 
 impl From<f64> for Plans {
@@ -80,6 +82,7 @@ impl Plans {
             apart: Vec::new(),
             rates: Vec::new(),
             gains: Vec::new(),
+            errors: Vec::new(),
         }
     }
 
@@ -123,6 +126,13 @@ impl Plans {
         Self { gains: gains.to_vec(), ..self }
     }
 
+    /// Declares how far each state may be from its measured value, finite, ≥ 0, in its unit. Default: those of
+    /// [the filter](super::FilterBuilder::measurement_errors), for which its rows allow too; these are for plans alone.
+    #[must_use]
+    pub fn measurement_errors(self, errors: &[f64]) -> Self {
+        Self { errors: errors.to_vec(), ..self }
+    }
+
     /// Declares that the sets of each pair of barriers, given by their numbers, have no state in common at any time.
     /// Promises that need both at once are then refused without a search ([`Failure::Apart`](crate::plan::Failure::Apart)).
     /// Nothing else depends on it.
@@ -139,6 +149,9 @@ impl Plans {
         self.horizon.map(|horizon| positive("horizon", horizon)).transpose()?;
         for (i, rate) in self.rates.iter().enumerate() {
             non_negative(&format!("uncertain_rates[{}]", i + 1), *rate)?;
+        }
+        for (i, error) in self.errors.iter().enumerate() {
+            non_negative(&format!("measurement_errors[{}]", i + 1), *error)?;
         }
         for (i, [least, most]) in self.gains.iter().enumerate() {
             let field = format!("uncertain_gains[{}]", i + 1);
@@ -226,10 +239,12 @@ impl Filter {
         let mut found = Vec::new();
         let rows = &self.rows;
         let refused = |field: &str, message: String| Error::new(ErrorKind::Unsupported, field, message);
-        if rows.delay > 0.0 {
-            found.push(refused("actuation_delay", format!("is {}, must be 0 for a plan", rows.delay)));
+        if rows.delay > plans.period {
+            let message = format!("is {}, must be <= period = {} for a plan", rows.delay, plans.period);
+            found.push(refused("actuation_delay", message));
         }
-        let is_uncertain = !(rows.errors.is_exact() && plans.rates.is_empty() && plans.gains.is_empty());
+        let is_uncertain = !rows.errors.is_exact()
+            || !(plans.errors.is_empty() && plans.rates.is_empty() && plans.gains.is_empty());
         if is_uncertain && self.integrator.is_some() {
             let message = "stands before an uncertain plant, for which no plan accounts yet";
             found.push(refused("integrator", message.into()));
@@ -279,10 +294,14 @@ impl Filter {
         if !plans.gains.is_empty() {
             length("uncertain_gains", plans.gains.len(), *input_dim)?;
         }
+        if !plans.errors.is_empty() {
+            length("measurement_errors", plans.errors.len(), *state_dim)?;
+        }
         let (rates, gains) = (plans.rates.iter().copied(), plans.gains.iter().copied());
+        let own = plans.errors.iter().copied().chain(core::iter::repeat(0.0));
         let uncertainty = Uncertainty {
             rates: rates.chain(core::iter::repeat(0.0)).take(*state_dim).collect(),
-            errors: errors.sizes(*state_dim),
+            errors: errors.sizes(*state_dim).into_iter().zip(own).map(|(rows, own)| rows.max(own)).collect(),
             gains: gains.chain(core::iter::repeat([1.0; 2])).take(*input_dim).collect(),
         };
         if uncertainty.is_nothing() {
@@ -325,7 +344,7 @@ impl Filter {
     /// The period at first, and after [`Self::rearm`] if the sample comes at another time than expected. `None` without
     /// plans.
     pub fn usual_hold(&self, t: f64) -> Option<f64> {
-        Some(self.rows.state.plan.usual_hold(t, self.backup.as_ref()?.period()))
+        Some(self.rows.state.plan.usual_hold(t + self.rows.delay, self.backup.as_ref()?.period()))
     }
 
     /// How long in s the last input was to be held, as far as known; without plans, the measured sampling period.
@@ -384,6 +403,7 @@ impl Backup {
             plans: &self.plans,
             bounds: &self.bounds,
             uncertainty: self.uncertainty.as_ref(),
+            measured: None,
         }
     }
 
@@ -409,11 +429,15 @@ impl Backup {
         u: &mut [f64],
     ) {
         let hold = self.planned_hold(hold, integrator.is_some());
-        let x = &self.planning((rows, integrator)).state(x)[..];
+        let planning = self.planning((rows, integrator));
+        let measured = &planning.state(x)[..];
+        let (acts, x) = planning.acts(t, measured);
         let Self { plans, bounds, uncertainty, assurance, piece, .. } = self;
         let uncertainty = uncertainty.as_ref();
-        let mut decision = Decision { rows, integrator, plans, bounds, uncertainty, assurance, piece };
-        decision.sample(At { t, hold, x }, u_ref, u);
+        let measured = (t, measured);
+        let mut decision =
+            Decision { rows, integrator, plans, bounds, uncertainty, measured, assurance, piece };
+        decision.sample(At { t: acts, hold, x: &x }, u_ref, u);
         rows.workspace.report.assurance = Some(self.assurance);
     }
 

@@ -28,6 +28,8 @@ pub struct Planning<'a> {
     pub(super) bounds: &'a Bounds,
     /// What is not known of the plant, if anything is declared.
     pub(super) uncertainty: Option<&'a Uncertainty>,
+    /// Time and model state of the sample from which a plan is sought, if its input acts later.
+    pub(super) measured: Option<(f64, &'a [f64])>,
 }
 
 impl<'a> Planning<'a> {
@@ -44,6 +46,44 @@ impl<'a> Planning<'a> {
     /// The model's state for the measured `x`.
     pub(super) fn state(&self, x: &[f64]) -> Vec<f64> {
         self.with(x, self.rows.state.integrated)
+    }
+
+    /// When in s an input of a sample at `t` begins to act, and the model's state there: `x`, moved on by the delay under the
+    /// input that still acts. Plans begin there.
+    pub(super) fn acts(&self, t: f64, x: &[f64]) -> (f64, Vec<f64>) {
+        let (mut x, delay) = (x.to_vec(), self.rows.delay);
+        if delay > 0.0
+            && let Some(plant) = self.models().next()
+        {
+            plant.flow(&mut x, &self.rows.acting()[..self.rows.input_dim], delay);
+        }
+        (t + delay, x)
+    }
+
+    /// Whether `promises` that begin at `acts` are kept from the sample (its time and state) on until then.
+    ///
+    /// # Errors
+    ///
+    /// Why they are not.
+    pub(super) fn waits(
+        &self,
+        promises: &[Option<Promise>],
+        (t, x): (f64, &[f64]),
+        acts: f64,
+    ) -> Result<(), Failure> {
+        if acts <= t {
+            return Ok(());
+        }
+        let begun = |promise: &Option<Promise>| {
+            promise.filter(|promise| promise.from <= acts).map(|promise| Promise { from: t, ..promise })
+        };
+        let begun: Vec<_> = promises.iter().map(begun).collect();
+        if begun.iter().all(Option::is_none) {
+            return Ok(());
+        }
+        let acting = self.rows.acting();
+        let acting = &acting[..self.rows.input_dim];
+        self.planned(&begun, (t, acts - t), acting, |planner| planner.holds(t, x, acting))
     }
 
     /// The direction of that state if the measured state moves along `dx`.
@@ -97,7 +137,8 @@ impl<'a> Planning<'a> {
         self.rows.slots.iter().filter_map(|slot| slot.source.predict())
     }
 
-    /// The promises from `x` at `t`, each deadline multiplied by the factor of its barrier.
+    /// The promises from `x` at `t`, where the input of the sample begins to act. Each deadline counts from the sample itself,
+    /// multiplied by the factor of its barrier.
     pub(super) fn promises(
         &self,
         t: f64,
@@ -108,7 +149,7 @@ impl<'a> Planning<'a> {
             // Not the h of the report, which is missing if u_ref is NaN.
             let h = model.value(t, x);
             // Slightly earlier, so that round-off of a time leaves no gap.
-            let after = |seconds: f64| t + seconds - TOLERANCES.on_time * self.plans.period;
+            let after = |seconds: f64| t - self.rows.delay + seconds - TOLERANCES.on_time * self.plans.period;
             let from = match (slot.begin, slot.promise.settings().deadline) {
                 (Begin::At(begin), _) if begin > 0.0 => after(begin),
                 // NaN is required at once, so that the check finds it.
@@ -119,7 +160,7 @@ impl<'a> Planning<'a> {
             };
             let until = match slot.end {
                 End::Never => f64::INFINITY,
-                End::At(seconds) => t + seconds,
+                End::At(seconds) => t - self.rows.delay + seconds,
                 End::OnArrival => from + self.plans.period,
             };
             let soft = matches!(slot.strictness, Strictness::Soft(_));
@@ -143,12 +184,13 @@ impl<'a> Planning<'a> {
         gradient.iter().zip(errors).map(|(slope, error)| 2.0 * slope.abs() * error).sum()
     }
 
-    /// `promises` with each deadline at `part` of its time from `t`. Promises with a begin of their own are unchanged.
+    /// `promises` with each deadline at `part` of its time from the sample whose input acts from `t` on. Promises with a begin of their own are unchanged.
     pub(super) fn sooner(&self, promises: &[Option<Promise>], t: f64, part: f64) -> Vec<Option<Promise>> {
         let sooner = |(promise, slot): (&Option<Promise>, &BarrierSlot)| {
             let mut promise = (*promise)?;
             if promise.from > t && slot.begin == Begin::AtOnce {
-                promise.from = t + part * (promise.from - t);
+                let sample = t - self.rows.delay;
+                promise.from = sample + part * (promise.from - sample);
                 if slot.end == End::OnArrival {
                     promise.until = promise.from + self.plans.period;
                 }
@@ -246,7 +288,9 @@ impl<'a> Planning<'a> {
         };
         let uncertain = self.uncertainty.map(|of| {
             let horizon = self.plans.horizon.unwrap_or(DECISIONS.uncertain_horizon);
-            Uncertain { of, bounds: self.bounds, horizon }
+            let delay = self.rows.delay;
+            let measured = self.measured.filter(|_| delay > 0.0);
+            Uncertain { of, bounds: self.bounds, horizon, delay, measured, acting: self.rows.acting() }
         });
         let mut planner = Planner::new(plant, dims, bounds, &requirements, period, size)
             .usually(self.plans.period)

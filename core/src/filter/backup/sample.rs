@@ -24,12 +24,14 @@ pub(super) struct Decision<'a> {
     pub(super) bounds: &'a Bounds,
     /// What is not known of the plant, if anything is declared.
     pub(super) uncertainty: Option<&'a Uncertainty>,
+    /// Time and state of the sample.
+    pub(super) measured: (f64, &'a [f64]),
     pub(super) assurance: &'a mut Assurance,
     /// How the input varies with the sample.
     pub(super) piece: &'a mut Piece,
 }
 
-/// Time and model state of a sample, and how long its input is held, in s.
+/// When the input of a sample begins to act, the model's state there, and how long it is held, in s.
 #[derive(Clone, Copy)]
 pub(super) struct At<'a> {
     pub(super) t: f64,
@@ -39,8 +41,9 @@ pub(super) struct At<'a> {
 
 impl Decision<'_> {
     fn planning(&self) -> Planning<'_> {
-        let Self { rows, integrator, plans, bounds, uncertainty, .. } = self;
-        Planning { rows, integrator: *integrator, plans, bounds, uncertainty: *uncertainty }
+        let Self { rows, integrator, plans, bounds, uncertainty, measured, .. } = self;
+        let measured = Some(*measured);
+        Planning { rows, integrator: *integrator, plans, bounds, uncertainty: *uncertainty, measured }
     }
 
     fn before(&self) -> &PlanState {
@@ -61,7 +64,9 @@ impl Decision<'_> {
         let Workspace { next, .. } = &mut self.rows.workspace;
         next.plan.clone_from(&self.rows.state.plan);
         // Not by the report's status: u_ref may be NaN.
-        if next.plan.status == AssuranceStatus::Undecided && !next.is_armed(t, self.rows.arm_after) {
+        if next.plan.status == AssuranceStatus::Undecided
+            && !next.is_armed(self.measured.0, self.rows.arm_after)
+        {
             (*self.assurance, *self.piece) = (Assurance::default(), Piece::ROWS);
             return;
         }
@@ -140,6 +145,10 @@ impl Decision<'_> {
             let later = least_factor(planning.longest(Plans::LONGEST, yields), None, later, sooner);
             found = later.map_or(found, Ok);
         }
+        // Until its first input acts, a filter can only look on.
+        found = found.and_then(|(factor, first)| {
+            planning.waits(&first.promises, self.measured, t).map(|()| (factor, first))
+        });
         match found {
             Ok((factor, First { promises, plan, is_old })) => {
                 let next = self.next();
@@ -163,7 +172,8 @@ impl Decision<'_> {
     /// Restarts the rows at the first sample, with deadlines `factor` times as long for the barriers that accept this. The
     /// rows keep more margin than the plans, so that a plan backs their answer at the edge of a set too.
     fn postpone(&mut self, t: f64, hold: f64, factor: f64) {
-        let Rows { slots, state, workspace, .. } = &mut *self.rows;
+        let Rows { slots, state, workspace, delay, .. } = &mut *self.rows;
+        let delay = *delay;
         let Workspace { next, report, .. } = workspace;
         let states = next.barriers.iter_mut().zip(&state.barriers).zip(&next.plan.promises);
         for ((slot, ((state, before), promise)), b) in slots.iter().zip(states).zip(&mut report.barriers) {
@@ -174,7 +184,8 @@ impl Decision<'_> {
                 continue;
             }
             let FixedTimeState { deadline, arrival, on_course, gain, unmet, .. } = *state;
-            let deadline = if later { factor * slot.promise.deadline() } else { deadline };
+            // Deadlines count from the sample, promises from where its input acts.
+            let deadline = if later { factor * slot.promise.deadline() - delay } else { deadline };
             slot.promise.anchor(state, t, &slot.now.derivatives.drift[..slot.degree()], deadline, hold);
             (state.arrival, state.gain, state.unmet) = (arrival, gain, unmet);
             if later {

@@ -369,7 +369,7 @@ impl Rows {
     }
 
     /// The input that acts until that of the present step does.
-    pub(super) fn acting(&self) -> [f64; MAX_INPUTS] {
+    pub(crate) fn acting(&self) -> [f64; MAX_INPUTS] {
         match self.state.time {
             Some(_) => self.state.input,
             // That of a step that was not armed, or otherwise 0.

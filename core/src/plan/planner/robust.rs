@@ -21,6 +21,11 @@ pub(crate) struct Uncertain<'a> {
     pub(crate) of: &'a Uncertainty,
     pub(crate) bounds: &'a Bounds,
     pub(crate) horizon: f64,
+    /// How long in s after its sample an input begins to act; if not at once, the sample from which a plan is sought, its
+    /// state, and the input that acts until then.
+    pub(crate) delay: f64,
+    pub(crate) measured: Option<(f64, &'a [f64])>,
+    pub(crate) acting: [f64; MAX_INPUTS],
 }
 
 /// The part of half the width of its bounds that the first search leaves of an input.
@@ -214,8 +219,7 @@ impl<'a> Planner<'a> {
     ) -> Result<Result<BackupPlan, Lacks>, Failure> {
         let Tracking { times, inputs, gains, .. } = law;
         let model = self.model(self.period);
-        let mut tube = Tube::around(self.plant, uncertain.of, uncertain.bounds, self.dims, self.requirements)
-            .ok_or(Failure::Spreads)?;
+        let mut tube = self.measured(uncertain)?;
         tube.records = records;
         let grid = Grid { period: self.period, even: true };
         let mut walk = Walk::new(model, self.tolerances, self.requirements, 1.0, grid, (times[0], x))?
@@ -224,7 +228,7 @@ impl<'a> Planner<'a> {
         let (mut states, mut radii) = (Vec::with_capacity(inputs.len()), Vec::with_capacity(inputs.len()));
         for k in 0..inputs.len() {
             states.push(walk.state().to_vec());
-            radii.extend(walk.tube().map(|tube| tube.radii().to_vec()));
+            radii.extend(walk.tube().map(|tube| tube.radii()));
             let gain = Some(&gains[k][..]).filter(|gain| !gain.is_empty());
             walk.hold_in_tube(&inputs[k], gain, times[k + 1])?;
         }
@@ -237,18 +241,33 @@ impl<'a> Planner<'a> {
         Ok(Ok(BackupPlan { tracking: Some(Arc::new(tracking)), ..backup_plan }))
     }
 
+    /// The tube in which the plant is when the input of a sample begins to act.
+    ///
+    /// # Errors
+    ///
+    /// There is none.
+    pub(super) fn measured<'b>(&'b self, uncertain: Uncertain<'b>) -> Result<Tube<'b>, Failure> {
+        let Uncertain { of, bounds, delay, measured, acting, .. } = uncertain;
+        let tube = Tube::around(self.plant, (of, delay), bounds, self.dims, self.requirements)
+            .ok_or(Failure::Spreads)?;
+        let Some((t, x)) = measured else { return Ok(tube) };
+        let grid = Grid { period: delay, even: true };
+        let mut walk = Walk::new(self.model(delay), self.tolerances, &[], 1.0, grid, (t, x))?.within(tube)?;
+        walk.hold_in_tube(&acting[..self.dims[1]], None, t + delay)?;
+        walk.finish().1.map(|tube| *tube).ok_or(Failure::Spreads)
+    }
+
     /// Whether the plant is at `x` at `t` where the law of `plan` is known to keep it.
     ///
     /// # Errors
     ///
     /// By how much it is not.
     pub(crate) fn is_declared(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<(), Failure> {
-        let (Some(uncertain), Some(tracking)) = (self.uncertain, &plan.backup_plan.tracking) else {
+        let (Some(_), Some(tracking)) = (self.uncertain, &plan.backup_plan.tracking) else {
             return Ok(());
         };
-        let escaped = tracking
-            .at(t, self.tolerances.on_time * self.period)
-            .and_then(|k| tracking.escaped(k, x, &uncertain.of.errors));
+        let escaped =
+            tracking.at(t, self.tolerances.on_time * self.period).and_then(|k| tracking.escaped(k, x));
         match escaped {
             Some((state, beyond)) => Err(Failure::Undeclared { state, beyond }),
             None => Ok(()),

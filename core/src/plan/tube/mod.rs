@@ -36,6 +36,9 @@ mod falls;
 mod tracking;
 mod zonotope;
 
+#[cfg(test)]
+mod tests;
+
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -101,6 +104,11 @@ pub(super) struct Lacks {
 pub(super) struct Tube<'a> {
     of: &'a Uncertainty,
     bounds: &'a Bounds,
+    /// How long in s after its sample an input begins to act, and how far the state that is predicted for then may be from
+    /// the true one.
+    delay: f64,
+    unseen: Vec<f64>,
+    next_unseen: Vec<f64>,
     /// Number of states, and of inputs.
     dims: [usize; 2],
     /// Deviations of the states and, behind them, of the inputs while they are held.
@@ -138,11 +146,12 @@ pub(super) struct Piece<'a> {
 }
 
 impl<'a> Tube<'a> {
-    /// The tube that begins within the errors of measurement around the reference. `None` if the plant has no derivatives on
+    /// The tube that begins within the errors of measurement around the reference, for inputs that act `delay` s after their
+    /// sample. `None` if the plant has no derivatives on
     /// enclosures.
     pub(super) fn around(
         plant: &dyn Predict,
-        of: &'a Uncertainty,
+        (of, delay): (&'a Uncertainty, f64),
         bounds: &'a Bounds,
         dims: [usize; 2],
         requirements: &[Requirement<'_>],
@@ -164,6 +173,9 @@ impl<'a> Tube<'a> {
         let mut tube = Self {
             of,
             bounds,
+            delay,
+            unseen: of.errors.clone(),
+            next_unseen: of.errors.clone(),
             dims,
             set: Zonotope::point(n + m),
             reach: vec![0.0; n + m],
@@ -185,10 +197,10 @@ impl<'a> Tube<'a> {
         Some(tube)
     }
 
-    /// The largest deviation of every state at the end of the last piece.
-    pub(super) fn radii(&mut self) -> &[f64] {
+    /// The largest deviation of every measured state from the reference at the end of the last piece.
+    pub(super) fn radii(&mut self) -> Vec<f64> {
         self.set.reach(&mut self.reach);
-        &self.reach[..self.dims[0]]
+        self.reach.iter().zip(&self.next_unseen).map(|(reach, unseen)| reach + unseen).collect()
     }
 
     /// Begins a hold of `v` from the reference state `z`, with the feedback `gain` (by input and state) of a measurement
@@ -199,6 +211,8 @@ impl<'a> Tube<'a> {
     /// An input that leaves its bounds.
     pub(super) fn hold(&mut self, v: &[f64], z: &[f64], gain: Option<&[f64]>) -> Result<(), Failure> {
         let ([n, m], most) = (self.dims, GENERATORS);
+        self.unseen.copy_from_slice(&self.next_unseen);
+        self.next_unseen.copy_from_slice(&self.of.errors);
         self.set.reach(&mut self.reach);
         let sizes: Vec<f64> = self.reach[..n].iter().map(|reach| reach.max(LEAST)).collect();
         self.set.reduce(most, n, &sizes, &mut self.rooms.scores);
@@ -214,7 +228,7 @@ impl<'a> Tube<'a> {
         });
         for j in 0..n {
             // The law itself rounds too.
-            let error = self.of.errors[j] + 8.0 * f64::EPSILON * (z[j].abs() + sizes[j]);
+            let error = self.unseen[j] + 8.0 * f64::EPSILON * (z[j].abs() + sizes[j]);
             let column = (0..n).map(|_| 0.0).chain((0..m).map(|i| gain[i * n + j] * error));
             self.set.push(column);
         }
@@ -410,7 +424,58 @@ impl<'a> Tube<'a> {
             set.push_along(i, *side);
         }
         reach[..n].copy_from_slice(&most[..n]);
-        all_finite(&sides) && all_finite(&set.centre)
+        if self.delay > 0.0 {
+            self.predict(model, piece, &most);
+        }
+        all_finite(&sides) && all_finite(&self.set.centre)
+    }
+
+    /// Bounds how far the state predicted over the delay may be from the true one, on `piece`, on which deviations are up to
+    /// `most`: ε′ ≥ ε + d (|M| ε′ + w + |N| (γ − 1) u) wherever the two are.
+    fn predict(&mut self, model: &dyn Predict, piece: Piece<'_>, most: &[f64]) {
+        let [n, m] = self.dims;
+        let Self { of, delay, next_unseen, plant, rooms, .. } = self;
+        let Rooms { variables, rates, at: here, slopes, .. } = rooms;
+        let evaluate = |variables: &[Second], out: &mut [Second]| {
+            let (x, u) = variables.split_at(n);
+            model.second_rates(x, u, out)
+        };
+        let lost = |j: usize| {
+            let [least, largest] = of.gains[j];
+            (1.0 - least).abs().max((largest - 1.0).abs()) * (piece.u[j].abs() + most[n + j])
+        };
+        let mut guess: Vec<f64> =
+            (0..n).map(|i| 2.0 * of.errors[i] + 2.0 * *delay * of.rates[i] + LEAST).collect();
+        for _ in 0..GUESSES {
+            here.clear();
+            here.extend((0..n + m).map(|i| match i < n {
+                true => {
+                    let wide = most[i] + guess[i];
+                    Interval::new(piece.over[i][0].low - wide, piece.over[i][0].high + wide)
+                }
+                false => Interval::new(
+                    piece.u[i - n] - most[i] - lost(i - n),
+                    piece.u[i - n] + most[i] + lost(i - n),
+                ),
+            }));
+            plant.slopes(here, (variables, rates), evaluate, slopes);
+            let wanted: Vec<f64> = (0..n)
+                .map(|i| {
+                    let slope = |j: usize| size(slopes[i * (n + m) + j]);
+                    let moved: f64 = (0..n).map(|j| slope(j) * guess[j]).sum();
+                    let driven: f64 = (0..m).map(|j| slope(n + j) * lost(j)).sum();
+                    (of.errors[i] + *delay * (moved + driven + of.rates[i])) * (1.0 + ROUND_OFF)
+                })
+                .collect();
+            if wanted.iter().zip(&guess).all(|(wanted, guess)| wanted <= guess) {
+                for (unseen, wanted) in next_unseen.iter_mut().zip(wanted) {
+                    *unseen = unseen.max(wanted);
+                }
+                return;
+            }
+            guess = wanted.iter().map(|wanted| 1.2 * wanted + LEAST).collect();
+        }
+        next_unseen.fill(f64::INFINITY);
     }
 }
 

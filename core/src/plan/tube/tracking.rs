@@ -24,11 +24,36 @@ pub struct Tracking {
     pub(in crate::plan) states: Vec<Vec<f64>>,
     /// The gain at every sample, by input and state; empty where the input is held as it is.
     pub(in crate::plan) gains: Vec<Vec<f64>>,
-    /// How far each state may be from the reference there.
+    /// How far each measured state may be from the reference there.
     pub(in crate::plan) radii: Vec<Vec<f64>>,
 }
 
 impl Tracking {
+    /// The time of every sample in s, and the end of the last hold.
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// The input v of every hold.
+    pub fn inputs(&self) -> &[Vec<f64>] {
+        &self.inputs
+    }
+
+    /// The reference z at every sample.
+    pub fn states(&self) -> &[Vec<f64>] {
+        &self.states
+    }
+
+    /// The gain K at every sample, one row of numbers by state for each input, one row after the other. Empty for 0.
+    pub fn gains(&self) -> &[Vec<f64>] {
+        &self.gains
+    }
+
+    /// How far each measured state may be from the reference at every sample.
+    pub fn radii(&self) -> &[Vec<f64>] {
+        &self.radii
+    }
+
     /// The number of the hold that begins at `t`, within `slack` s of it.
     pub(in crate::plan) fn at(&self, t: f64, slack: f64) -> Option<usize> {
         let k = self.times.partition_point(|time| *time < t - slack);
@@ -72,12 +97,11 @@ impl Tracking {
         }
     }
 
-    /// The state that is farther from the reference at sample `k` than is possible, if there is one, and by how much. `x` is
-    /// measured with at most `errors`.
-    pub(in crate::plan) fn escaped(&self, k: usize, x: &[f64], errors: &[f64]) -> Option<(usize, f64)> {
+    /// The state that is farther from the reference at sample `k` than is possible, if there is one, and by how much.
+    pub(in crate::plan) fn escaped(&self, k: usize, x: &[f64]) -> Option<(usize, f64)> {
         let beyond = |i: usize| {
             let round_off = 1e-9 * (1.0 + x[i].abs());
-            (x[i] - self.states[k][i]).abs() - self.radii[k][i] - errors[i] - round_off
+            (x[i] - self.states[k][i]).abs() - self.radii[k][i] - round_off
         };
         // NaN has escaped.
         (0..x.len()).map(|i| (i, beyond(i))).find(|(_, beyond)| !(*beyond <= 0.0))

@@ -1,0 +1,213 @@
+//! Sets that enclose, and tubes that no plant within what was declared leaves.
+
+use alloc::boxed::Box;
+use alloc::sync::Arc;
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::*;
+use crate::barriers::{DistanceDisc, Outside};
+use crate::dynamics::ControlAffine;
+use crate::lie::{self, DerivativeSource, EXPANSION_ORDERS};
+use crate::plan::expansion;
+use crate::plants::{Bicycle, PointMass, Unicycle};
+
+struct Draws(u64);
+
+impl Draws {
+    fn part(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn signed(&mut self) -> f64 {
+        2.0 * self.part() - 1.0
+    }
+}
+
+fn source<P>(plant: P) -> Box<dyn DerivativeSource>
+where
+    P: ControlAffine<4, 2> + Send + Sync + 'static,
+{
+    let rock = Outside(DistanceDisc::new([3.0, 1.0], 0.5, 1.0).expect("a disc"));
+    lie::along(Arc::new(plant), rock, 2).expect("a source")
+}
+
+fn bends(model: &dyn Predict) -> Bends {
+    let found = Bends::of(4, 6, |variables, out| {
+        let (x, u) = variables.split_at(4);
+        model.second_rates(x, u, out)
+    });
+    found.expect("derivatives")
+}
+
+#[test]
+fn what_is_curved_is_found() {
+    // v cos θ, v sin θ, ω, a: by θ twice, and by θ and v.
+    let found = bends(source(Unicycle).predict().expect("a model"));
+    assert_eq!((found.bent, found.pairs), (vec![2, 3], vec![[2, 2], [2, 3]]));
+    // And v β/l_r.
+    let found = bends(source(Bicycle::new(2.5).expect("a length")).predict().expect("a model"));
+    assert_eq!((found.bent, found.pairs), (vec![2, 3, 5], vec![[2, 2], [2, 3], [3, 5]]));
+    let found = bends(source(PointMass).predict().expect("a model"));
+    assert_eq!((found.bent, found.pairs), (vec![], vec![]));
+}
+
+#[test]
+fn a_reduced_zonotope_encloses_what_it_was() {
+    let mut draws = Draws(3);
+    for _ in 0..50 {
+        let mut set = Zonotope::point(3);
+        for k in 0..60 {
+            set.push((0..3).map(|_| draws.signed() / f64::from(1 + k)));
+        }
+        let mut reduced = set.clone();
+        reduced.reduce(20, 3, &[1.0, 0.5, 2.0], &mut Vec::new());
+        assert!(reduced.columns().len() <= 20);
+        for _ in 0..200 {
+            let direction: Vec<f64> = (0..3).map(|_| draws.signed()).collect();
+            assert!(reduced.half_width(&direction) >= set.half_width(&direction));
+        }
+        // No wider than the box around it.
+        let (mut reach, mut before) = ([0.0; 3], [0.0; 3]);
+        reduced.reach(&mut reach);
+        set.reach(&mut before);
+        assert!(reach.iter().zip(before).all(|(reach, before)| *reach <= before * (1.0 + 1e-12)));
+    }
+}
+
+#[test]
+fn the_series_of_a_matrix_is_that_of_its_exponential() {
+    // A rotation: e^A turns by the angle.
+    let angle = 0.05_f64;
+    let [flow, integral] = exponential(&[0.0, -angle, angle, 0.0], 2);
+    assert!((flow[0] - angle.cos()).abs() < 1e-9 && (flow[2] - angle.sin()).abs() < 1e-8);
+    assert!(
+        (integral[0] - angle.sin() / angle).abs() < 1e-7
+            && (integral[2] - (1.0 - angle.cos()) / angle).abs() < 1e-6
+    );
+}
+
+/// A run of a plant beside a reference: `worse` times the declared uncertainty, drawn or kept at a corner.
+struct Beside<'a, P> {
+    plant: &'a P,
+    of: &'a Uncertainty,
+    worse: f64,
+    corners: bool,
+}
+
+impl<P: ControlAffine<4, 2>> Beside<'_, P> {
+    fn draw(&self, draws: &mut Draws, size: f64) -> f64 {
+        let part = draws.signed();
+        self.worse * size * if self.corners { part.signum() } else { part }
+    }
+
+    /// Moves `x` by `dt` under what arrives of `u`, with a disturbance of its own; by ten steps of Heun's method.
+    fn run(&self, draws: &mut Draws, x: &mut [f64; 4], u: [f64; 2], dt: f64) {
+        let arrives: [f64; 2] = core::array::from_fn(|i| {
+            let [low, high] = self.of.gains[i];
+            u[i] * (0.5 * (low + high) + self.draw(draws, 0.5 * (high - low)))
+        });
+        let w: [f64; 4] = core::array::from_fn(|i| self.draw(draws, self.of.rates[i]));
+        let rate = |x: &[f64; 4]| {
+            let rate = self.plant.derivative(x, &arrives);
+            core::array::from_fn::<f64, 4, _>(|i| rate[i] + w[i])
+        };
+        for _ in 0..10 {
+            let (h, k1) = (dt / 10.0, rate(x));
+            let k2 = rate(&core::array::from_fn(|i| x[i] + h * k1[i]));
+            for i in 0..4 {
+                x[i] += 0.5 * h * (k1[i] + k2[i]);
+            }
+        }
+    }
+}
+
+/// Follows a curved reference under a constant gain, with `runs` plants beside it. Returns how many left the tube, in a
+/// direction or by h, at a sample or between.
+fn escapes<P>(plant: P, gain: &[f64], worse: f64, runs: usize) -> usize
+where
+    P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
+{
+    let own = source(plant.clone());
+    let model = own.predict().expect("a model");
+    let of = Uncertainty {
+        rates: vec![0.02, 0.01, 0.02, 0.1],
+        errors: vec![0.02, 0.02, 0.01, 0.02],
+        gains: vec![[0.9, 1.05], [0.95, 1.1]],
+    };
+    let bounds = Bounds { min: [-9.0; MAX_INPUTS], max: [9.0; MAX_INPUTS] };
+    let requirement = Requirement {
+        barrier: 0,
+        is_limit: false,
+        model,
+        from: 0.0,
+        until: f64::INFINITY,
+        margin: 0.0,
+        firm: 0.0,
+        reserve: 0.0,
+    };
+    let mut tube = Tube::around(model, (&of, 0.0), &bounds, [4, 2], &[requirement]).expect("derivatives");
+    let mut draws = Draws(11);
+    let mut z = [0.0, 0.0, 0.3, 1.0];
+    let mut beside: Vec<[f64; 4]> = Vec::new();
+    let worlds: Vec<Beside<'_, P>> =
+        (0..runs).map(|k| Beside { plant: &plant, of: &of, worse, corners: k % 2 == 0 }).collect();
+    for world in &worlds {
+        beside.push(core::array::from_fn(|i| z[i] + world.draw(&mut draws, of.errors[i])));
+    }
+    let mut left = vec![false; runs];
+    for k in 0..100 {
+        let v = [0.5 * (0.1 * f64::from(k)).sin(), 0.4 * (0.07 * f64::from(k)).cos()];
+        tube.hold(&v, &z, Some(gain)).expect("within bounds");
+        let inputs: Vec<[f64; 2]> = (worlds.iter().zip(&beside))
+            .map(|(world, x)| {
+                let seen: [f64; 4] =
+                    core::array::from_fn(|i| x[i] + world.draw(&mut draws, of.errors[i]) - z[i]);
+                core::array::from_fn(|i| v[i] + zonotope::dot(&gain[4 * i..4 * i + 4], &seen))
+            })
+            .collect();
+        let (mut path, mut over) = (vec![[0.0; EXPANSION_ORDERS]; 4], Vec::new());
+        model.path(&z, &v, &mut path);
+        let dt = 0.02;
+        over.extend(path.iter().map(|c| expansion::over(c, dt)));
+        assert!(tube.advance(model, Piece { path: &path, over: &over, dt, u: &v }, |_| 1e-10));
+        let fall = tube.fall((0, &requirement), Interval::from(0.0), &over);
+        for step in 1..=2 {
+            let at_end = step == 2;
+            let reference: [f64; 4] =
+                core::array::from_fn(|i| at(&path[i], dt / 2.0 * f64::from(step)));
+            for ((world, x), (u, left)) in worlds.iter().zip(&mut beside).zip(inputs.iter().zip(&mut left)) {
+                world.run(&mut draws, x, *u, dt / 2.0);
+                *left |= model.value(0.0, x) < model.value(0.0, &reference) - fall;
+                let e: [f64; 4] = core::array::from_fn(|i| x[i] - reference[i]);
+                for _ in 0..if at_end { 20 } else { 0 } {
+                    let direction: Vec<f64> = (0..4).map(|_| draws.signed()).collect();
+                    let (along, centre) =
+                        (zonotope::dot(&direction, &e), zonotope::dot(&direction, &tube.set.centre));
+                    *left |= (along - centre).abs() > tube.set.half_width(&direction) * (1.0 + 1e-9) + 1e-9;
+                }
+            }
+        }
+        z = core::array::from_fn(|i| at(&path[i], dt));
+    }
+    left.iter().filter(|left| **left).count()
+}
+
+/// Gains that follow: the position by the heading and the speed.
+const FOLLOWS: [f64; 8] = [-1.2, -0.4, 0.0, -1.8, 0.4, -1.2, -2.2, 0.0];
+
+#[test]
+fn no_plant_within_what_was_declared_leaves_its_tube() {
+    assert_eq!(escapes(Unicycle, &FOLLOWS, 1.0, 60), 0);
+    assert_eq!(escapes(Bicycle::new(2.5).expect("a length"), &FOLLOWS, 1.0, 60), 0);
+    let point = [-1.5, 0.0, -2.0, 0.0, 0.0, -1.5, 0.0, -2.0];
+    assert_eq!(escapes(PointMass, &point, 1.0, 60), 0);
+}
+
+/// The judge can fail: plants that are much worse than declared leave.
+#[test]
+fn plants_beyond_what_was_declared_leave_their_tube() {
+    assert!(escapes(Unicycle, &FOLLOWS, 8.0, 60) > 30);
+    assert!(escapes(PointMass, &[-1.5, 0.0, -2.0, 0.0, 0.0, -1.5, 0.0, -2.0], 8.0, 60) > 30);
+}
