@@ -182,10 +182,10 @@ impl<C: Scalar> Series<C> {
             }
             // a y' = p a' y.
             O::Power(a, number) => {
-                let (exponent, (base, own)) = (f64::from_bits(number), (self.of(a), self.of(to)));
+                let (next, (base, own)) = (C::from(f64::from_bits(number)) + 1.0, (self.of(a), self.of(to)));
                 let mut sum = C::zero();
                 for i in 1..=k {
-                    sum += base[i] * own[k - i] * (i as f64 * (exponent + 1.0) - k as f64);
+                    sum += base[i] * own[k - i] * (next * i as f64 - k as f64);
                 }
                 sum * (1.0 / k as f64) / base[0]
             }

@@ -348,10 +348,11 @@ impl<C: Scalar, const K: usize> Scalar for Taylor<C, K> {
         let mut y = [C::zero(); K];
         y[0] = a[0].powf(exponent);
         let reciprocal = C::one() / a[0];
+        let next = C::from(exponent) + 1.0;
         for k in 1..K {
             let mut sum = C::zero();
             for i in 1..=k {
-                sum += a[i] * y[k - i] * (i as f64 * (exponent + 1.0) - k as f64);
+                sum += a[i] * y[k - i] * (next * i as f64 - k as f64);
             }
             y[k] = sum * reciprocal * (1.0 / k as f64);
         }
