@@ -409,7 +409,7 @@ impl Backup {
 
     /// Whether a plan backs the step at `t`, so that the rows need not be met.
     pub(super) fn is_behind(&self, plan: &PlanState, t: f64, hold: f64, integrates: bool) -> bool {
-        plan.is_followed() && plan.lost.is_none() && plan.in_time(t, self.planned_hold(hold, integrates))
+        plan.is_followed() && plan.lost.is_none() && plan.in_time(t, self.planned_hold(hold, integrates), DECISIONS.jitter)
     }
 
     /// The hold that plans assume for an input that is held for `hold` s.

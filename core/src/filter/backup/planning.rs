@@ -43,6 +43,12 @@ impl<'a> Planning<'a> {
         &self.rows.workspace.next.plan
     }
 
+    /// Whether a sample at `t` comes in time. A measured clock may be late, unless a tube says where the plant is until then.
+    pub(super) fn in_time(&self, t: f64, hold: f64) -> bool {
+        let jitter = if self.uncertainty.is_some() { TOLERANCES.on_time } else { DECISIONS.jitter };
+        self.before().in_time(t, hold, jitter)
+    }
+
     /// The model's state for the measured `x`.
     pub(super) fn state(&self, x: &[f64]) -> Vec<f64> {
         self.with(x, self.rows.state.integrated)

@@ -94,7 +94,7 @@ impl Decision<'_> {
                 false => self.go_on(at, u),
             };
         } else if self.now().status == AssuranceStatus::Undecided && !self.now().plan.is_empty() {
-            if self.before().in_time(t, hold) {
+            if self.planning().in_time(t, hold) {
                 self.assurance.driver = self.go_on(at, u);
             } else {
                 self.next().plan = Plan::default();
@@ -223,7 +223,7 @@ impl Decision<'_> {
         // A promise that expired was kept until then.
         let has_expired = self.before().status == AssuranceStatus::Expired;
         let lost = |status| if has_expired { AssuranceStatus::Expired } else { status };
-        match (self.before().in_time(t, hold), is_valid.then(|| self.missed(t, x)).flatten()) {
+        match (self.planning().in_time(t, hold), is_valid.then(|| self.missed(t, x)).flatten()) {
             (true, None) if is_valid => self.end(AssuranceStatus::Assured, None),
             (true, None) => {}
             (false, None) => self.end(lost(AssuranceStatus::Irregular), None),

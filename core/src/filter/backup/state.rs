@@ -112,12 +112,12 @@ impl PlanState {
         }
     }
 
-    /// Whether a sample at `t` comes no later than the previous one announced, allowing for a measured clock, and whether
-    /// times are precise enough to distinguish samples.
-    pub(super) fn in_time(&self, t: f64, hold: f64) -> bool {
+    /// Whether a sample at `t` comes no later than the previous one announced, but for `jitter` as a part of the hold, and
+    /// whether times are precise enough to distinguish samples.
+    pub(super) fn in_time(&self, t: f64, hold: f64, jitter: f64) -> bool {
         let Some([last, held]) = self.sample else { return false };
         let round_off = round_off(t);
-        let late = DECISIONS.jitter * held + round_off;
+        let late = jitter * held + round_off;
         // NaN counts as out of time.
         last <= t && t <= last + held + late && round_off <= DECISIONS.distinct * hold.min(held)
     }

@@ -274,29 +274,28 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// The remainder of `plan` from `x` at `t` by its law, if it has one.
+    /// The remainder of `plan` from `x` at `t` by its law, if it has one: at one of its samples by the feedback, within a hold
+    /// by the input that is held.
     ///
     /// # Errors
     ///
-    /// It has ended, or the plant is not where it was declared to be.
+    /// The plan has ended; the plant is not where it was declared to be; or the next sample comes after the end of the hold.
     pub(super) fn followed(&self, plan: &Plan, t: f64, x: &[f64]) -> Option<Result<BackupPlan, Failure>> {
         let (uncertain, tracking) = (self.uncertain?, plan.backup_plan.tracking.as_ref()?);
         Some(self.is_declared(plan, t, x).and_then(|()| {
             let slack = self.tolerances.on_time * self.period;
             let mut inputs = plan.backup_plan.inputs.clone();
             inputs.retain(|(end, _)| *end > t + slack);
+            let Some(hold) = inputs.first_mut().filter(|(end, _)| t + self.period <= end + slack) else {
+                return Err(Failure::NoRest);
+            };
             if let Some(k) = tracking.at(t, slack) {
-                let mut u = [0.0; MAX_INPUTS];
-                tracking.input(k, x, &mut u[..self.dims[1]]);
-                for (i, u) in u.iter_mut().enumerate().take(self.dims[1]) {
+                tracking.input(k, x, &mut hold.1[..self.dims[1]]);
+                for (i, u) in hold.1.iter_mut().enumerate().take(self.dims[1]) {
                     *u = uncertain.bounds.clamp(i, *u);
                 }
-                inputs[0] = (tracking.times[k + 1], u);
             }
-            match inputs.is_empty() {
-                true => Err(Failure::NoRest),
-                false => Ok(BackupPlan { inputs, ..plan.backup_plan.clone() }),
-            }
+            Ok(BackupPlan { inputs, ..plan.backup_plan.clone() })
         }))
     }
 
