@@ -443,6 +443,41 @@ fn a_restored_filter_continues_the_law() {
     }
 }
 
+/// What a plan is said to bear, it bears: half of it, declared, is accepted along the same plan and kept.
+#[test]
+fn what_a_plan_is_said_to_bear_is_borne() {
+    let mut draws = Draws(9);
+    let case = Case::draw(&mut draws, [4.0, 1.5], false);
+    let exact = case.filter(Unicycle, None);
+    let bears = exact.planning().unwrap().bears(0.0, &case.x).unwrap();
+    println!("{bears:?}");
+    assert!(bears.rates.iter().chain(&bears.errors).chain(&bears.gains).all(|size| *size > 0.0), "{bears:?}");
+    let none = Declared { rates: [0.0; 4], errors: [0.0; 4], gains: [[1.0; 2]; 2], delay: 0.0 };
+    let mut kinds = Vec::new();
+    for i in 0..4 {
+        let mut of = none.clone();
+        of.rates[i] = 0.5 * bears.rates[i];
+        kinds.push(of);
+        let mut of = none.clone();
+        of.errors[i] = 0.5 * bears.errors[i];
+        kinds.push(of);
+    }
+    for i in 0..2 {
+        let mut of = none.clone();
+        of.gains[i] = [1.0 - 0.5 * bears.gains[i], 1.0 + 0.5 * bears.gains[i]];
+        kinds.push(of);
+    }
+    for (k, declared) in kinds.into_iter().enumerate() {
+        let how =
+            Run { adversary: ADVERSARIES[k % 4], asks: Asks::Hostile, seed: k as u64, time: 9.0, worse: 1.0 };
+        let outcome = run(Unicycle, &case, &declared, &how);
+        assert!(
+            outcome.accepted && outcome.withdrawn == 0 && outcome.least >= 0.0,
+            "{declared:?}: {outcome:?}"
+        );
+    }
+}
+
 #[test]
 fn what_is_declared_is_checked() {
     let case = Case::draw(&mut Draws(1), [4.0, 4.0], true);

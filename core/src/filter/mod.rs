@@ -23,7 +23,7 @@ pub use crate::convergence::{
     FixedTimeSettings as BarrierSettings, Infeasible, Method, Phase, ProfileKind, Refusal,
 };
 #[cfg(feature = "plan")]
-pub use backup::{Assurance, AssuranceStatus, Driver, PlanState, Planning, Plans, Reason};
+pub use backup::{Assurance, AssuranceStatus, Bears, Driver, PlanState, Planning, Plans, Reason};
 pub use builder::FilterBuilder;
 pub use integrator::Integration;
 pub use report::{BarrierReport, Report, Status};

@@ -31,6 +31,11 @@ pub struct BackupPlan {
 }
 
 impl BackupPlan {
+    /// The largest rate of state `i` along the plan.
+    pub(crate) fn largest_rate(&self, i: usize) -> f64 {
+        self.rates[i]
+    }
+
     /// The law that keeps every requirement for an uncertain plant, along `inputs`; `None` if nothing uncertain is declared.
     pub fn tracking(&self) -> Option<&Tracking> {
         self.tracking.as_deref()

@@ -9,9 +9,11 @@
 //! | `first` | the plan of a first sample, and the earliest deadlines that a plan keeps |
 //! | `sample` | a sample: what is promised, whether it is kept, and which source drives the plant |
 //! | `choice` | the input: the candidates, in order |
+//! | `bears` | what a plan bears of a plant that is not the model |
 //! | `deviation` | the observed deviation of the plant from the model |
 //! | `settings` | the numbers that decide on a guarantee |
 
+mod bears;
 mod choice;
 mod deviation;
 mod first;
@@ -35,6 +37,7 @@ use crate::interval::Interval;
 use crate::lie::{Direction, Second, SharedPlant};
 use crate::plan::{BackupPlan, Policy, Uncertainty};
 use crate::qp::Bounds;
+pub use bears::Bears;
 use choice::Piece;
 pub use planning::Planning;
 use sample::{At, Decision};
@@ -409,7 +412,9 @@ impl Backup {
 
     /// Whether a plan backs the step at `t`, so that the rows need not be met.
     pub(super) fn is_behind(&self, plan: &PlanState, t: f64, hold: f64, integrates: bool) -> bool {
-        plan.is_followed() && plan.lost.is_none() && plan.in_time(t, self.planned_hold(hold, integrates), DECISIONS.jitter)
+        plan.is_followed()
+            && plan.lost.is_none()
+            && plan.in_time(t, self.planned_hold(hold, integrates), DECISIONS.jitter)
     }
 
     /// The hold that plans assume for an input that is held for `hold` s.

@@ -133,6 +133,19 @@ impl<'a> Planner<'a> {
             .map_err(|lacks| lacks.failure.unwrap_or(Failure::Spreads))
     }
 
+    /// Whether a law along `plan`, from `x` at `t`, keeps every requirement for the uncertain plant.
+    ///
+    /// # Errors
+    ///
+    /// What it lacks.
+    pub(crate) fn bears(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<(), Failure> {
+        let uncertain = self.uncertain.ok_or(Failure::Nothing)?;
+        match self.tracked(uncertain, plan, t, x, false)? {
+            Ok(_) => Ok(()),
+            Err(lacks) => Err(lacks.failure.unwrap_or(Failure::Spreads)),
+        }
+    }
+
     /// The backup plan of `plan` from `x` at `t`, with the law that keeps every requirement for the uncertain plant. Gains
     /// are those that it has, if it has any. Its first input needs no feedback, since the state is measured there.
     ///

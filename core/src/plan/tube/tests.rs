@@ -175,8 +175,7 @@ where
         let fall = tube.fall((0, &requirement), Interval::from(0.0), &over);
         for step in 1..=2 {
             let at_end = step == 2;
-            let reference: [f64; 4] =
-                core::array::from_fn(|i| at(&path[i], dt / 2.0 * f64::from(step)));
+            let reference: [f64; 4] = core::array::from_fn(|i| at(&path[i], dt / 2.0 * f64::from(step)));
             for ((world, x), (u, left)) in worlds.iter().zip(&mut beside).zip(inputs.iter().zip(&mut left)) {
                 world.run(&mut draws, x, *u, dt / 2.0);
                 *left |= model.value(0.0, x) < model.value(0.0, &reference) - fall;
