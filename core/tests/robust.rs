@@ -64,6 +64,7 @@ struct Declared {
     rates: [f64; 4],
     errors: [f64; 4],
     gains: [[f64; 2]; 2],
+    lags: [[f64; 2]; 2],
     delay: f64,
 }
 
@@ -74,7 +75,11 @@ impl Declared {
             true => ([0.0, 0.0, 0.1, 0.1], [0.02; 4]),
             false => ([0.0, 0.0, 0.02, 0.1], [0.02, 0.02, 0.01, 0.02]),
         };
-        Self { rates, errors, gains: [[0.95, 1.05]; 2], delay: 0.0 }
+        Self { rates, errors, gains: [[0.95, 1.05]; 2], ..Self::nothing() }
+    }
+
+    fn nothing() -> Self {
+        Self { rates: [0.0; 4], errors: [0.0; 4], gains: [[1.0; 2]; 2], lags: [[0.0; 2]; 2], delay: 0.0 }
     }
 }
 
@@ -121,9 +126,13 @@ impl Case {
         let low = self.bounds.map(|b| -b);
         builder = builder.bounds(&low, &self.bounds).unwrap().sampling(Sampling::Period(PERIOD)).unwrap();
         let mut plans = Plans::every(PERIOD);
-        if let Some(Declared { rates, errors, gains, delay }) = declared {
+        if let Some(Declared { rates, errors, gains, lags, delay }) = declared {
             builder = builder.actuation_delay(*delay).unwrap();
-            plans = plans.uncertain_rates(rates).uncertain_gains(gains).measurement_errors(errors);
+            plans = plans
+                .uncertain_rates(rates)
+                .uncertain_gains(gains)
+                .uncertain_lags(lags)
+                .measurement_errors(errors);
         }
         builder.build().unwrap().with_plans(plans).unwrap()
     }
@@ -149,6 +158,7 @@ struct Sides {
     errors: [f64; 4],
     rates: [f64; 4],
     gains: [f64; 2],
+    lags: [f64; 2],
 }
 
 impl Sides {
@@ -157,6 +167,7 @@ impl Sides {
             errors: core::array::from_fn(|_| draw()),
             rates: core::array::from_fn(|_| draw()),
             gains: core::array::from_fn(|_| draw()),
+            lags: core::array::from_fn(|_| draw()),
         }
     }
 
@@ -204,7 +215,8 @@ impl Sides {
             if gained == 0.0 { sign(adjoint[j]) } else { sign(gained) }
         });
         let gains = core::array::from_fn(|i| sign(effect[i] * u[i]));
-        Some(Self { errors, rates: adjoint.map(sign), gains })
+        // As late as can be.
+        Some(Self { errors, rates: adjoint.map(sign), gains, lags: [1.0; 2] })
     }
 }
 
@@ -236,9 +248,9 @@ fn run<P>(plant: P, case: &Case, declared: &Declared, how: &Run) -> Outcome
 where
     P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
 {
-    let Declared { rates, errors, gains, delay } = declared;
+    let Declared { rates, errors, gains, lags, delay } = declared;
     let (mut draws, mut filter) = (Draws(how.seed), case.filter(plant.clone(), Some(declared)));
-    let (mut x, mut acting) = (case.x, [0.0; 2]);
+    let (mut x, mut acting, mut late) = (case.x, [0.0; 2], [0.0; 2]);
     let mut sides = Sides::of(|| draws.sign());
     let mut outcome = Outcome { least: f64::INFINITY, ..Outcome::default() };
     for step in 0..(how.time / PERIOD) as u32 {
@@ -288,7 +300,17 @@ where
         };
         for part in 0..PARTS {
             let h = PERIOD / f64::from(PARTS);
-            let u = if (f64::from(part) + 0.5) * h < *delay { &before } else { &u };
+            let asked = if (f64::from(part) + 0.5) * h < *delay { &before } else { &u };
+            let follow = |late: &mut [f64; 2]| {
+                for i in 0..2 {
+                    let [low, high] = lags[i];
+                    let lag = 0.5 * (low + high) + 0.5 * how.worse * (high - low) * sides.lags[i];
+                    late[i] = asked[i] + (late[i] - asked[i]) * (-0.5 * h / lag.max(1e-9)).exp();
+                }
+            };
+            // The input in the middle of the part.
+            follow(&mut late);
+            let u = &late;
             // Kutta's rule of third order.
             let moved = |by: [(f64, &[f64; 4]); 2]| {
                 core::array::from_fn::<f64, 4, _>(|i| {
@@ -299,6 +321,7 @@ where
             let k2 = rate(&moved([(0.5, &k1), (0.0, &k1)]), u);
             let k3 = rate(&moved([(-1.0, &k1), (2.0, &k2)]), u);
             x = core::array::from_fn(|i| x[i] + h / 6.0 * (k1[i] + 4.0 * k2[i] + k3[i]));
+            follow(&mut late);
             let now = t + h * f64::from(part + 1);
             for (j, (h, guaranteed)) in case.h(&x).into_iter().zip(&guaranteed).enumerate() {
                 if *guaranteed && (j > 0 || now >= DEADLINE) {
@@ -389,8 +412,18 @@ fn bicycles_keep_what_was_promised() {
 fn a_delay_of_a_step_is_accounted_for() {
     let delay = |declared: Declared| Declared { delay: PERIOD, ..declared };
     is_kept(&tally("unicycle", Unicycle, [4.0, 1.5], |is_point| delay(Declared::all(is_point)), 4));
-    let exact = |_| Declared { rates: [0.0; 4], errors: [0.0; 4], gains: [[1.0; 2]; 2], delay: PERIOD };
+    let exact = |_| Declared { delay: PERIOD, ..Declared::nothing() };
     is_kept(&tally("bicycle", Bicycle::new(2.5).unwrap(), [4.0, 0.6], exact, 5));
+}
+
+/// A motor follows late, and by how much is not known.
+#[test]
+fn a_lag_is_accounted_for() {
+    let late = |longest: f64| move |_| Declared { lags: [[0.0, longest]; 2], ..Declared::nothing() };
+    is_kept(&tally("point mass", PointMass, [4.0, 4.0], late(0.1), 6));
+    is_kept(&tally("unicycle", Unicycle, [4.0, 1.5], late(0.05), 7));
+    let all = |is_point| Declared { lags: [[0.0, 0.05]; 2], ..Declared::all(is_point) };
+    is_kept(&tally("unicycle", Unicycle, [4.0, 1.5], all, 8));
 }
 
 /// A plant far beyond what was declared is not where the law can have led it: the flag falls.
@@ -452,7 +485,7 @@ fn what_a_plan_is_said_to_bear_is_borne() {
     let bears = exact.planning().unwrap().bears(0.0, &case.x).unwrap();
     println!("{bears:?}");
     assert!(bears.rates.iter().chain(&bears.errors).chain(&bears.gains).all(|size| *size > 0.0), "{bears:?}");
-    let none = Declared { rates: [0.0; 4], errors: [0.0; 4], gains: [[1.0; 2]; 2], delay: 0.0 };
+    let none = Declared::nothing();
     let mut kinds = Vec::new();
     for i in 0..4 {
         let mut of = none.clone();
@@ -469,7 +502,7 @@ fn what_a_plan_is_said_to_bear_is_borne() {
     }
     for (k, declared) in kinds.into_iter().enumerate() {
         let how =
-            Run { adversary: ADVERSARIES[k % 4], asks: Asks::Hostile, seed: k as u64, time: 9.0, worse: 1.0 };
+            Run { adversary: ADVERSARIES[k % 4], asks: Asks::Hostile, seed: k as u64, time: 4.0, worse: 1.0 };
         let outcome = run(Unicycle, &case, &declared, &how);
         assert!(
             outcome.accepted && outcome.withdrawn == 0 && outcome.least >= 0.0,
@@ -496,6 +529,8 @@ fn what_is_declared_is_checked() {
         (plans().uncertain_gains(&[[0.9, 1.0]]), "uncertain_gains: has 1 components, must have 2"),
         (plans().uncertain_gains(&[[0.9, 1.0], [1.1, 0.9]]), "uncertain_gains[2]: is [1.1, 0.9]"),
         (plans().uncertain_gains(&[[0.0, 1.0]; 2]), "uncertain_gains[1]: is 0"),
+        (plans().uncertain_lags(&[[0.1, 0.0]; 2]), "uncertain_lags[1]: is [0.1, 0]"),
+        (plans().uncertain_lags(&[[-0.1, 0.1]; 2]), "uncertain_lags[1]: is -0.1"),
         (plans().measurement_errors(&[0.1; 3]), "measurement_errors: has 3 components, must have 4"),
         (plans().measurement_errors(&[f64::INFINITY; 4]), "measurement_errors[1]: is inf"),
     ] {

@@ -45,6 +45,7 @@ impl Planning<'_> {
             rates: vec![0.0; states],
             errors: vec![0.0; states],
             gains: vec![[1.0; 2]; inputs],
+            lags: vec![[0.0; 2]; inputs],
         });
         let keeps = |uncertainty: &Uncertainty| {
             let planning = Planning { uncertainty: Some(uncertainty), ..own };

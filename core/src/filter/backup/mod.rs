@@ -59,6 +59,8 @@ pub struct Plans {
     /// What may be added to the rate of each state, and which part of each input arrives; empty for nothing and all.
     rates: Vec<f64>,
     gains: Vec<[f64; 2]>,
+    /// The time constant in s with which each input is followed; empty for at once.
+    lags: Vec<[f64; 2]>,
     /// How far each state may be from its measured value; empty if the rows know.
     errors: Vec<f64>,
 }
@@ -85,6 +87,7 @@ impl Plans {
             apart: Vec::new(),
             rates: Vec::new(),
             gains: Vec::new(),
+            lags: Vec::new(),
             errors: Vec::new(),
         }
     }
@@ -129,6 +132,14 @@ impl Plans {
         Self { gains: gains.to_vec(), ..self }
     }
 
+    /// Declares the time constant in s with which what arrives of each input follows what is asked, from the least to the
+    /// largest, 0 ≤ least ≤ largest: u̇ = (u_asked − u)/τ, as a motor does. Before the first sample 0 was asked, or the nearest
+    /// admissible input. Default: `[0.0, 0.0]` each, at once.
+    #[must_use]
+    pub fn uncertain_lags(self, lags: &[[f64; 2]]) -> Self {
+        Self { lags: lags.to_vec(), ..self }
+    }
+
     /// Declares how far each state may be from its measured value, finite, ≥ 0, in its unit. Default: those of
     /// [the filter](super::FilterBuilder::measurement_errors), for which its rows allow too; these are for plans alone.
     #[must_use]
@@ -159,6 +170,13 @@ impl Plans {
         for (i, [least, most]) in self.gains.iter().enumerate() {
             let field = format!("uncertain_gains[{}]", i + 1);
             if positive(&field, *least)? > positive(&field, *most)? {
+                let message = format!("is [{least}, {most}], must be least <= largest");
+                return Err(Error::new(ErrorKind::Range, &field, message));
+            }
+        }
+        for (i, [least, most]) in self.lags.iter().enumerate() {
+            let field = format!("uncertain_lags[{}]", i + 1);
+            if non_negative(&field, *least)? > non_negative(&field, *most)? {
                 let message = format!("is [{least}, {most}], must be least <= largest");
                 return Err(Error::new(ErrorKind::Range, &field, message));
             }
@@ -247,7 +265,8 @@ impl Filter {
             found.push(refused("actuation_delay", message));
         }
         let is_uncertain = !rows.errors.is_exact()
-            || !(plans.errors.is_empty() && plans.rates.is_empty() && plans.gains.is_empty());
+            || !(plans.errors.is_empty() && plans.rates.is_empty())
+            || !(plans.gains.is_empty() && plans.lags.is_empty());
         if is_uncertain && self.integrator.is_some() {
             let message = "stands before an uncertain plant, for which no plan accounts yet";
             found.push(refused("integrator", message.into()));
@@ -297,6 +316,9 @@ impl Filter {
         if !plans.gains.is_empty() {
             length("uncertain_gains", plans.gains.len(), *input_dim)?;
         }
+        if !plans.lags.is_empty() {
+            length("uncertain_lags", plans.lags.len(), *input_dim)?;
+        }
         if !plans.errors.is_empty() {
             length("measurement_errors", plans.errors.len(), *state_dim)?;
         }
@@ -306,6 +328,7 @@ impl Filter {
             rates: rates.chain(core::iter::repeat(0.0)).take(*state_dim).collect(),
             errors: errors.sizes(*state_dim).into_iter().zip(own).map(|(rows, own)| rows.max(own)).collect(),
             gains: gains.chain(core::iter::repeat([1.0; 2])).take(*input_dim).collect(),
+            lags: plans.lags.iter().copied().chain(core::iter::repeat([0.0; 2])).take(*input_dim).collect(),
         };
         if uncertainty.is_nothing() {
             return Ok(None);

@@ -66,6 +66,22 @@ impl<'a> Planning<'a> {
         (t + delay, x)
     }
 
+    /// What may arrive of each input at `t`, where the input of a sample begins to act: the least and the largest, if inputs
+    /// are followed late.
+    pub(super) fn arriving(&self, t: f64) -> Vec<[f64; 2]> {
+        let Some(of) = self.uncertainty.filter(|of| of.lags()) else { return Vec::new() };
+        let (PlanState { arrived, sample, .. }, asked) = (self.before(), self.rows.acting());
+        let since = sample.map_or(0.0, |[last, _]| (t - last).max(0.0));
+        let arrives = |i: usize| {
+            let asked = asked[i];
+            let [low, high] = arrived.get(i).copied().unwrap_or([asked; 2]);
+            let [least, largest] = of.remains(i, since);
+            let [low, high] = [low - asked, high - asked];
+            [asked + (low * least).min(low * largest), asked + (high * least).max(high * largest)]
+        };
+        (0..self.rows.input_dim).map(arrives).collect()
+    }
+
     /// Whether `promises` that begin at `acts` are kept from the sample (its time and state) on until then.
     ///
     /// # Errors
@@ -292,11 +308,26 @@ impl<'a> Planning<'a> {
             Some(_) => &narrowed(self.bounds, &self.now().plan.reserve),
             None => self.bounds,
         };
+        // From the sample on, if its input acts later.
+        let mut arrived = self.now().arrived.clone();
+        if self.rows.delay > 0.0 {
+            for (now, before) in arrived.iter_mut().zip(&self.before().arrived) {
+                *now = [now[0].min(before[0]), now[1].max(before[1])];
+            }
+        }
         let uncertain = self.uncertainty.map(|of| {
             let horizon = self.plans.horizon.unwrap_or(DECISIONS.uncertain_horizon);
             let delay = self.rows.delay;
             let measured = self.measured.filter(|_| delay > 0.0);
-            Uncertain { of, bounds: self.bounds, horizon, delay, measured, acting: self.rows.acting() }
+            Uncertain {
+                of,
+                bounds: self.bounds,
+                horizon,
+                delay,
+                measured,
+                acting: self.rows.acting(),
+                arrived: &arrived,
+            }
         });
         let mut planner = Planner::new(plant, dims, bounds, &requirements, period, size)
             .usually(self.plans.period)

@@ -74,6 +74,7 @@ impl Decision<'_> {
         rows[..u.len()].copy_from_slice(u);
         let is_valid = t.is_finite() && all_finite(x);
         if t.is_finite() && (is_valid || self.now().sample.is_some()) {
+            self.next().arrived = self.planning().arriving(t);
             self.see(t, is_valid.then_some(x));
             self.next().note(t, hold);
         }

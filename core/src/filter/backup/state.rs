@@ -8,6 +8,7 @@ use super::deviation::Deviation;
 use super::settings::DECISIONS;
 use crate::error::{Error, ErrorKind, length};
 use crate::plan::{BackupPlan, Failure, Plan, SearchProgress, TOLERANCES};
+use crate::scalar::all_finite;
 
 /// The part of a [`FilterState`](crate::filter::FilterState) that belongs to plans: the promises and the plan that keeps
 /// them.
@@ -38,6 +39,9 @@ pub struct PlanState {
     /// Time of the last sample in s, and how long its input was to be held.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub(super) sample: Option<[f64; 2]>,
+    /// What may arrive of each input at that time, before the input of that sample, if it is followed late: the least and the
+    /// largest.
+    pub(super) arrived: Vec<[f64; 2]>,
     /// The time in s between the last two samples, and how many intervals in a row have been about as long; 0 before there
     /// is one.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
@@ -73,7 +77,8 @@ impl PlanState {
 
     /// Forgets what was promised. Keeps a plan that was followed, to continue with it, and the time of the last sample.
     pub(crate) fn rearm(&mut self) {
-        let Self { status, promises, plan, sample, interval, alike, .. } = core::mem::take(self);
+        let Self { status, promises, plan, sample, arrived, interval, alike, .. } = core::mem::take(self);
+        self.arrived = arrived;
         let is_over = |[t, _]: [f64; 2]| promises.iter().flatten().all(|promise| promise.until <= t);
         let is_followed = match status {
             AssuranceStatus::Assured => !sample.is_none_or(is_over),
@@ -156,6 +161,7 @@ impl PlanState {
             memory,
             prolong_at,
             sample,
+            arrived,
             interval,
             ..
         } = self;
@@ -191,6 +197,9 @@ impl PlanState {
             }
             if self.is_followed() && !self.deviation.fits(dims[0]) {
                 return refuse("deviation", "is not of a plant with as many states");
+            }
+            if !arrived.is_empty() && arrived.len() != dims[1] || !all_finite(arrived.as_flattened()) {
+                return refuse("arrived", "is not of a plant with as many inputs, or not finite");
             }
             if !interval.is_finite() {
                 return refuse("interval", "is not finite");

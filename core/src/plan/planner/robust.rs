@@ -26,6 +26,8 @@ pub(crate) struct Uncertain<'a> {
     pub(crate) delay: f64,
     pub(crate) measured: Option<(f64, &'a [f64])>,
     pub(crate) acting: [f64; MAX_INPUTS],
+    /// What may arrive of each input then, if inputs are followed late; otherwise, or if empty, that input.
+    pub(crate) arrived: &'a [[f64; 2]],
 }
 
 /// The part of half the width of its bounds that the first search leaves of an input.
@@ -260,9 +262,12 @@ impl<'a> Planner<'a> {
     ///
     /// There is none.
     pub(super) fn measured<'b>(&'b self, uncertain: Uncertain<'b>) -> Result<Tube<'b>, Failure> {
-        let Uncertain { of, bounds, delay, measured, acting, .. } = uncertain;
+        let Uncertain { of, bounds, delay, measured, acting, arrived, .. } = uncertain;
+        let arrives = |i: usize| arrived.get(i).copied().unwrap_or([acting[i]; 2]);
+        let arrives: Vec<[f64; 2]> = (0..self.dims[1]).map(arrives).collect();
         let tube = Tube::around(self.plant, (of, delay), bounds, self.dims, self.requirements)
-            .ok_or(Failure::Spreads)?;
+            .ok_or(Failure::Spreads)?
+            .acted_on(&arrives);
         let Some((t, x)) = measured else { return Ok(tube) };
         let grid = Grid { period: delay, even: true };
         let mut walk = Walk::new(self.model(delay), self.tolerances, &[], 1.0, grid, (t, x))?.within(tube)?;

@@ -20,6 +20,10 @@
 //! residual of z and round-off. First (1) is bounded on a guess of all deviations on the piece, which is verified (Picard and
 //! Lindelöf).
 //!
+//! An input that is followed late by a time constant adds rows of its own: what arrives is v + δ + λ, and λ, which jumps by
+//! −(Δv + Δδ) at every sample, dies away meanwhile. So only changes of the input are late, the law's among them, and the
+//! zonotope knows from which deviations these come.
+//!
 //! | module | owns |
 //! |---|---|
 //! | here | the tube, moved on by a piece |
@@ -76,6 +80,8 @@ pub(crate) struct Uncertainty {
     pub(crate) errors: Vec<f64>,
     /// Which part of each input arrives, from the least to the largest.
     pub(crate) gains: Vec<[f64; 2]>,
+    /// The time constant in s with which each input is followed, from the least to the largest.
+    pub(crate) lags: Vec<[f64; 2]>,
 }
 
 impl Uncertainty {
@@ -83,6 +89,26 @@ impl Uncertainty {
     pub(crate) fn is_nothing(&self) -> bool {
         self.rates.iter().chain(&self.errors).all(|size| *size == 0.0)
             && self.gains.iter().all(|gain| *gain == [1.0; 2])
+            && !self.lags()
+    }
+}
+
+impl Uncertainty {
+    /// Whether an input is followed late.
+    pub(crate) fn lags(&self) -> bool {
+        self.lags.iter().any(|[_, longest]| *longest > 0.0)
+    }
+
+    /// What remains of a difference of input `i` from what is asked of it after `dt` s, as a part of it: the least and the
+    /// largest.
+    pub(crate) fn remains(&self, i: usize, dt: f64) -> [f64; 2] {
+        self.lags[i].map(|lag| if lag > 0.0 { elementary::exp(-dt / lag) } else { 0.0 })
+    }
+
+    /// The mean of that over `dt` s.
+    fn remains_on_average(&self, i: usize, dt: f64) -> [f64; 2] {
+        // It rises with the lag.
+        self.lags[i].map(|lag| if lag > 0.0 { lag / dt * (1.0 - elementary::exp(-dt / lag)) } else { 0.0 })
     }
 }
 
@@ -111,8 +137,12 @@ pub(super) struct Tube<'a> {
     next_unseen: Vec<f64>,
     /// Number of states, and of inputs.
     dims: [usize; 2],
-    /// Deviations of the states and, behind them, of the inputs while they are held.
+    /// Deviations of the states; if inputs are followed late, of what arrives from what is asked; and of the inputs asked while
+    /// they are held.
     set: Zonotope,
+    /// The number of rows of the second kind, 0 or one for each input, and the last inputs asked of the reference.
+    late: usize,
+    last: Vec<f64>,
     /// The largest deviation on the last piece, and how far one moves there.
     reach: Vec<f64>,
     moved: Vec<f64>,
@@ -170,6 +200,7 @@ impl<'a> Tube<'a> {
                 None => false,
             })
         };
+        let late = if of.lags() { m } else { 0 };
         let mut tube = Self {
             of,
             bounds,
@@ -177,8 +208,10 @@ impl<'a> Tube<'a> {
             unseen: of.errors.clone(),
             next_unseen: of.errors.clone(),
             dims,
-            set: Zonotope::point(n + m),
-            reach: vec![0.0; n + m],
+            set: Zonotope::point(n + late + m),
+            late,
+            last: vec![0.0; m],
+            reach: vec![0.0; n + late + m],
             moved: vec![0.0; n],
             records: false,
             lacks: Lacks {
@@ -197,6 +230,18 @@ impl<'a> Tube<'a> {
         Some(tube)
     }
 
+    /// The same tube if each input that arrives is within `acting` when it begins.
+    pub(super) fn acted_on(mut self, acting: &[[f64; 2]]) -> Self {
+        let n = self.dims[0];
+        for (i, [low, high]) in acting.iter().enumerate() {
+            self.last[i] = 0.5 * (low + high);
+            if self.late > 0 {
+                self.set.push_along(n + i, 0.5 * (high - low) * (1.0 + ROUND_OFF));
+            }
+        }
+        self
+    }
+
     /// The largest deviation of every measured state from the reference at the end of the last piece.
     pub(super) fn radii(&mut self) -> Vec<f64> {
         self.set.reach(&mut self.reach);
@@ -210,31 +255,40 @@ impl<'a> Tube<'a> {
     ///
     /// An input that leaves its bounds.
     pub(super) fn hold(&mut self, v: &[f64], z: &[f64], gain: Option<&[f64]>) -> Result<(), Failure> {
-        let ([n, m], most) = (self.dims, GENERATORS);
+        let ([n, m], kept) = (self.dims, self.dims[0] + self.late);
         self.unseen.copy_from_slice(&self.next_unseen);
         self.next_unseen.copy_from_slice(&self.of.errors);
         self.set.reach(&mut self.reach);
-        let sizes: Vec<f64> = self.reach[..n].iter().map(|reach| reach.max(LEAST)).collect();
-        self.set.reduce(most, n, &sizes, &mut self.rooms.scores);
-        let Some(gain) = gain else {
-            self.set.map(|column| column[n..].fill(0.0));
-            return Ok(());
-        };
+        let sizes: Vec<f64> = self.reach[..kept].iter().map(|reach| reach.max(LEAST)).collect();
+        self.set.reduce(GENERATORS, kept, &sizes, &mut self.rooms.scores);
         self.set.map(|column| {
-            let (e, d) = column.split_at_mut(n);
-            for (d, gain) in d.iter_mut().zip(gain.chunks_exact(n)) {
-                *d = zonotope::dot(gain, e);
+            let (e, others) = column.split_at_mut(n);
+            let (late, asked) = others.split_at_mut(kept - n);
+            for (i, asked) in asked.iter_mut().enumerate() {
+                let share = gain.map_or(0.0, |gain| zonotope::dot(&gain[i * n..][..n], e));
+                if let Some(late) = late.get_mut(i) {
+                    *late -= share - *asked;
+                }
+                *asked = share;
             }
         });
+        if self.late > 0 {
+            for (i, v) in v.iter().enumerate() {
+                self.set.centre[n + i] -= v - self.last[i];
+            }
+        }
+        self.last.copy_from_slice(v);
+        let Some(gain) = gain else { return Ok(()) };
         for j in 0..n {
             // The law itself rounds too.
             let error = self.unseen[j] + 8.0 * f64::EPSILON * (z[j].abs() + sizes[j]);
-            let column = (0..n).map(|_| 0.0).chain((0..m).map(|i| gain[i * n + j] * error));
-            self.set.push(column);
+            let asked = (0..m).map(|i| gain[i * n + j] * error);
+            let late = asked.clone().map(|asked| -asked).take(self.late);
+            self.set.push((0..n).map(|_| 0.0).chain(late).chain(asked));
         }
         self.set.reach(&mut self.reach);
         for (i, v) in v.iter().enumerate() {
-            let share = self.reach[n + i] * (1.0 + ROUND_OFF);
+            let share = self.reach[kept + i] * (1.0 + ROUND_OFF);
             self.lacks.feedback[i] = self.lacks.feedback[i].max(share);
             let over = (v + share - self.bounds.max[i]).max(self.bounds.min[i] - v + share);
             // NaN is not within bounds.
@@ -270,8 +324,8 @@ impl<'a> Tube<'a> {
         residual: impl Fn(usize) -> f64,
     ) -> bool {
         let Piece { path, over, dt, u } = piece;
-        let [n, m] = self.dims;
-        let Self { of, set, reach, moved, plant, rooms, .. } = self;
+        let ([n, m], kept) = (self.dims, self.dims[0] + self.late);
+        let Self { of, set, late, reach, moved, plant, rooms, .. } = self;
         let Rooms { variables, rates, at: here, slopes, curvatures, moves, .. } = rooms;
         rates.resize(n, Second::from(0.0));
         let evaluate = |variables: &[Second], out: &mut [Second]| {
@@ -291,22 +345,29 @@ impl<'a> Tube<'a> {
             })
             .collect();
         let slope = |i: usize, j: usize| slopes[i * (n + m) + j];
-        // What arrives of an input differs from v by `part` times its deviation, by `fixed`, and by at most `spread`.
-        let arrives: Vec<[f64; 3]> = (0..m)
+        // What arrives of an input differs from v by `part` of its deviation asked and of `mean` times its late one, by `fixed`,
+        // and by at most `spread`; of its late deviation at most `changes` is not in the mean. Altogether by at most `most`.
+        let arrives: Vec<Arrives> = (0..m)
             .map(|i| {
-                let [least, most] = of.gains[i];
-                let (middle, half) = (0.5 * (least + most), 0.5 * (most - least) * (1.0 + 1e-15));
-                [middle, (middle - 1.0) * u[i], half * (u[i].abs() + reach[n + i])]
+                let [least, largest] = of.gains[i];
+                let (part, half) = (0.5 * (least + largest), 0.5 * (largest - least) * (1.0 + 1e-15));
+                let late = if *late > 0 { reach[n + i] } else { 0.0 };
+                let (mean, differs) = middle(of.remains_on_average(i, dt));
+                let (asked, fixed) = (reach[kept + i], (part - 1.0) * u[i]);
+                let gained = half * (u[i].abs() + asked + late);
+                Arrives {
+                    part,
+                    mean,
+                    fixed,
+                    spread: gained + part * differs * late,
+                    changes: part * late,
+                    most: (part * (asked + late) + fixed.abs() + gained) * (1.0 + ROUND_OFF),
+                }
             })
             .collect();
-        let input = |i: usize, reach: f64| {
-            let [part, fixed, spread] = arrives[i];
-            part.abs() * reach + fixed.abs() + spread
-        };
         // Bounds on the deviations while the piece lasts: guessed, and verified.
-        let begin: Vec<f64> = (0..n + m)
-            .map(|i| if i < n { reach[i] } else { input(i - n, reach[i]) * (1.0 + ROUND_OFF) })
-            .collect();
+        let begin: Vec<f64> =
+            (0..n + m).map(|i| if i < n { reach[i] } else { arrives[i - n].most }).collect();
         let mut most: Vec<f64> = begin.clone();
         let linear =
             |i: usize, most: &[f64]| (0..n + m).map(|j| slope(i, j).value().abs() * most[j]).sum::<f64>();
@@ -361,7 +422,7 @@ impl<'a> Tube<'a> {
             .map(|k| {
                 let (i, j) = (k / m, k % m);
                 let along: f64 = (0..n).map(|l| integral[i * n + l] * slope(l, n + j).value()).sum();
-                along * dt * arrives[j][0]
+                along * dt * arrives[j].part
             })
             .collect();
         // What it leaves out: of all powers of M beyond, where |M| dt · most ≤ κ · most.
@@ -370,7 +431,9 @@ impl<'a> Tube<'a> {
         };
         let besides: Vec<f64> = (0..n)
             .map(|i| {
-                let gains: f64 = (0..m).map(|j| slope(i, n + j).value().abs() * arrives[j][2]).sum();
+                let gains: f64 = (arrives.iter().enumerate())
+                    .map(|(j, arrives)| slope(i, n + j).value().abs() * (arrives.spread + arrives.changes))
+                    .sum();
                 dt * (others[i] + gains)
             })
             .collect();
@@ -397,18 +460,26 @@ impl<'a> Tube<'a> {
             let bent: f64 = (plant.pairs.iter().zip(curvatures.chunks_exact(n)))
                 .map(|(pair, along)| along[i].value() * product(*pair, &away, &most)[0])
                 .sum();
-            let fixed: f64 = (0..m).map(|j| slope(i, n + j).value() * arrives[j][1]).sum();
+            let fixed: f64 = (0..m).map(|j| slope(i, n + j).value() * arrives[j].fixed).sum();
             bent + fixed
         };
         let shifts: Vec<f64> = (0..n).map(shift).collect();
         moves.clear();
         moves.resize(n, 0.0);
         set.map(|column| {
-            let (e, d) = column.split_at_mut(n);
+            let (e, others) = column.split_at_mut(n);
+            let (late, asked) = others.split_at_mut(kept - n);
             for (i, moved) in moves.iter_mut().enumerate() {
-                *moved = zonotope::dot(&flow[i * n..][..n], e) + zonotope::dot(&driven[i * m..][..m], d);
+                let by = &driven[i * m..][..m];
+                *moved = zonotope::dot(&flow[i * n..][..n], e) + zonotope::dot(by, asked);
+                for ((by, late), arrives) in by.iter().zip(&*late).zip(&arrives) {
+                    *moved += by * arrives.mean * late;
+                }
             }
             e.copy_from_slice(moves);
+            for (i, late) in late.iter_mut().enumerate() {
+                *late *= middle(of.remains(i, dt)).0;
+            }
         });
         for (i, row) in integral.chunks_exact(n).enumerate() {
             set.centre[i] += zonotope::dot(row, &shifts) * dt;
@@ -417,8 +488,14 @@ impl<'a> Tube<'a> {
             let [_, spread] = product(*pair, &away, &most);
             set.push(along.iter().map(|along| along.value() * spread * dt));
         }
-        for (j, [.., spread]) in arrives.iter().enumerate().filter(|(_, [.., spread])| *spread > 0.0) {
+        for (j, Arrives { spread, .. }) in
+            arrives.iter().enumerate().filter(|(_, arrives)| arrives.spread > 0.0)
+        {
             set.push((0..n).map(|i| slope(i, n + j).value() * spread * dt));
+        }
+        for i in 0..*late {
+            let (_, differs) = middle(of.remains(i, dt));
+            set.push_along(n + i, (differs * reach[n + i]) * (1.0 + ROUND_OFF));
         }
         for (i, side) in sides.iter().enumerate() {
             set.push_along(i, *side);
@@ -434,15 +511,17 @@ impl<'a> Tube<'a> {
     /// `most`: ε′ ≥ ε + d (|M| ε′ + w + |N| (γ − 1) u) wherever the two are.
     fn predict(&mut self, model: &dyn Predict, piece: Piece<'_>, most: &[f64]) {
         let [n, m] = self.dims;
-        let Self { of, delay, next_unseen, plant, rooms, .. } = self;
+        let Self { of, delay, next_unseen, plant, rooms, late, reach, .. } = self;
         let Rooms { variables, rates, at: here, slopes, .. } = rooms;
         let evaluate = |variables: &[Second], out: &mut [Second]| {
             let (x, u) = variables.split_at(n);
             model.second_rates(x, u, out)
         };
+        // The prediction knows what was asked, not what arrived of it.
         let lost = |j: usize| {
             let [least, largest] = of.gains[j];
-            (1.0 - least).abs().max((largest - 1.0).abs()) * (piece.u[j].abs() + most[n + j])
+            let late = if *late > 0 { reach[n + j] } else { 0.0 };
+            late + (1.0 - least).abs().max((largest - 1.0).abs()) * (piece.u[j].abs() + most[n + j] + late)
         };
         let mut guess: Vec<f64> =
             (0..n).map(|i| 2.0 * of.errors[i] + 2.0 * *delay * of.rates[i] + LEAST).collect();
@@ -477,6 +556,21 @@ impl<'a> Tube<'a> {
         }
         next_unseen.fill(f64::INFINITY);
     }
+}
+
+/// How an input arrives on a piece ([`Tube::advance`]).
+struct Arrives {
+    part: f64,
+    mean: f64,
+    fixed: f64,
+    spread: f64,
+    changes: f64,
+    most: f64,
+}
+
+/// The middle of two numbers, and half of what lies between them, rounded up.
+fn middle([low, high]: [f64; 2]) -> (f64, f64) {
+    (0.5 * (low + high), 0.5 * (high - low) * (1.0 + ROUND_OFF) + f64::EPSILON * high)
 }
 
 /// (2) on deviations up to `most`, for a reference up to `away` from where the derivatives are taken: its middle, and its

@@ -102,26 +102,42 @@ impl<P: ControlAffine<4, 2>> Beside<'_, P> {
         self.worse * size * if self.corners { part.signum() } else { part }
     }
 
-    /// Moves `x` by `dt` under what arrives of `u`, with a disturbance of its own; by ten steps of Heun's method.
-    fn run(&self, draws: &mut Draws, x: &mut [f64; 4], u: [f64; 2], dt: f64) {
-        let arrives: [f64; 2] = core::array::from_fn(|i| {
+    /// Moves `x` by `dt` under what arrives of `u`, with a disturbance of its own; by ten steps of Heun's method. What arrives
+    /// is a part of `late`, which follows `u`.
+    fn run(&self, draws: &mut Draws, x: &mut [f64; 4], late: &mut [f64; 2], u: [f64; 2], dt: f64) {
+        let gains: [f64; 2] = core::array::from_fn(|i| {
             let [low, high] = self.of.gains[i];
-            u[i] * (0.5 * (low + high) + self.draw(draws, 0.5 * (high - low)))
+            0.5 * (low + high) + self.draw(draws, 0.5 * (high - low))
+        });
+        let follows: [f64; 2] = core::array::from_fn(|i| {
+            let [low, high] = self.of.lags[i];
+            (-0.05 * dt / (0.5 * (low + high) + self.draw(draws, 0.5 * (high - low))).max(1e-9)).exp()
         });
         let w: [f64; 4] = core::array::from_fn(|i| self.draw(draws, self.of.rates[i]));
-        let rate = |x: &[f64; 4]| {
-            let rate = self.plant.derivative(x, &arrives);
+        let rate = |x: &[f64; 4], late: &[f64; 2]| {
+            let rate = self.plant.derivative(x, &core::array::from_fn(|i| gains[i] * late[i]));
             core::array::from_fn::<f64, 4, _>(|i| rate[i] + w[i])
         };
         for _ in 0..10 {
-            let (h, k1) = (dt / 10.0, rate(x));
-            let k2 = rate(&core::array::from_fn(|i| x[i] + h * k1[i]));
+            let follow = |late: &mut [f64; 2]| {
+                for i in 0..2 {
+                    late[i] = u[i] + follows[i] * (late[i] - u[i]);
+                }
+            };
+            // The input in the middle of a step.
+            follow(late);
+            let (h, k1) = (dt / 10.0, rate(x, late));
+            let k2 = rate(&core::array::from_fn(|i| x[i] + h * k1[i]), late);
+            follow(late);
             for i in 0..4 {
                 x[i] += 0.5 * h * (k1[i] + k2[i]);
             }
         }
     }
 }
+
+/// The error of the judge's own integration.
+const INTEGRATED: f64 = 1e-6;
 
 /// Follows a curved reference under a constant gain, with `runs` plants beside it. Returns how many left the tube, in a
 /// direction or by h, at a sample or between.
@@ -135,6 +151,7 @@ where
         rates: vec![0.02, 0.01, 0.02, 0.1],
         errors: vec![0.02, 0.02, 0.01, 0.02],
         gains: vec![[0.9, 1.05], [0.95, 1.1]],
+        lags: vec![[0.01, 0.06], [0.0, 0.04]],
     };
     let bounds = Bounds { min: [-9.0; MAX_INPUTS], max: [9.0; MAX_INPUTS] };
     let requirement = Requirement {
@@ -147,14 +164,16 @@ where
         firm: 0.0,
         reserve: 0.0,
     };
-    let mut tube = Tube::around(model, (&of, 0.0), &bounds, [4, 2], &[requirement]).expect("derivatives");
+    let tube = Tube::around(model, (&of, 0.0), &bounds, [4, 2], &[requirement]).expect("derivatives");
+    let mut tube = tube.acted_on(&[[-0.2, 0.3], [0.0, 0.4]]);
     let mut draws = Draws(11);
     let mut z = [0.0, 0.0, 0.3, 1.0];
-    let mut beside: Vec<[f64; 4]> = Vec::new();
+    let (mut beside, mut late) = (Vec::new(), Vec::new());
     let worlds: Vec<Beside<'_, P>> =
         (0..runs).map(|k| Beside { plant: &plant, of: &of, worse, corners: k % 2 == 0 }).collect();
     for world in &worlds {
         beside.push(core::array::from_fn(|i| z[i] + world.draw(&mut draws, of.errors[i])));
+        late.push([0.05 + world.draw(&mut draws, 0.25), 0.2 + world.draw(&mut draws, 0.2)]);
     }
     let mut left = vec![false; runs];
     for k in 0..100 {
@@ -176,15 +195,16 @@ where
         for step in 1..=2 {
             let at_end = step == 2;
             let reference: [f64; 4] = core::array::from_fn(|i| at(&path[i], dt / 2.0 * f64::from(step)));
-            for ((world, x), (u, left)) in worlds.iter().zip(&mut beside).zip(inputs.iter().zip(&mut left)) {
-                world.run(&mut draws, x, *u, dt / 2.0);
+            let runs = worlds.iter().zip(beside.iter_mut().zip(&mut late));
+            for ((world, (x, late)), (u, left)) in runs.zip(inputs.iter().zip(&mut left)) {
+                world.run(&mut draws, x, late, *u, dt / 2.0);
                 *left |= model.value(0.0, x) < model.value(0.0, &reference) - fall;
                 let e: [f64; 4] = core::array::from_fn(|i| x[i] - reference[i]);
                 for _ in 0..if at_end { 20 } else { 0 } {
                     let direction: Vec<f64> = (0..4).map(|_| draws.signed()).collect();
                     let (along, centre) =
                         (zonotope::dot(&direction, &e), zonotope::dot(&direction, &tube.set.centre));
-                    *left |= (along - centre).abs() > tube.set.half_width(&direction) * (1.0 + 1e-9) + 1e-9;
+                    *left |= (along - centre).abs() > tube.set.half_width(&direction) + INTEGRATED;
                 }
             }
         }
