@@ -422,7 +422,7 @@ fn a_lag_is_accounted_for() {
     let late = |longest: f64| move |_| Declared { lags: [[0.0, longest]; 2], ..Declared::nothing() };
     is_kept(&tally("point mass", PointMass, [4.0, 4.0], late(0.1), 6));
     is_kept(&tally("unicycle", Unicycle, [4.0, 1.5], late(0.05), 7));
-    let all = |is_point| Declared { lags: [[0.0, 0.05]; 2], ..Declared::all(is_point) };
+    let all = |is_point| Declared { lags: [[0.0, 0.02]; 2], ..Declared::all(is_point) };
     is_kept(&tally("unicycle", Unicycle, [4.0, 1.5], all, 8));
 }
 

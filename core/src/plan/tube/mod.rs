@@ -22,7 +22,8 @@
 //!
 //! An input that is followed late by a time constant adds rows of its own: what arrives is v + δ + λ, and λ, which jumps by
 //! −(Δv + Δδ) at every sample, dies away meanwhile. So only changes of the input are late, the law's among them, and the
-//! zonotope knows from which deviations these come.
+//! zonotope knows from which deviations these come. The answer to errors of measurement is apart: what arrives of it is a
+//! mean of earlier answers, so that it counts as it is, anew at every instant.
 //!
 //! | module | owns |
 //! |---|---|
@@ -143,6 +144,9 @@ pub(super) struct Tube<'a> {
     /// The number of rows of the second kind, 0 or one for each input, and the last inputs asked of the reference.
     late: usize,
     last: Vec<f64>,
+    /// The largest share of each input so far that answers an error of measurement, if inputs are followed late. What arrives
+    /// of it then is a mean of earlier ones, and no larger.
+    noise: Vec<f64>,
     /// The largest deviation on the last piece, and how far one moves there.
     reach: Vec<f64>,
     moved: Vec<f64>,
@@ -211,6 +215,7 @@ impl<'a> Tube<'a> {
             set: Zonotope::point(n + late + m),
             late,
             last: vec![0.0; m],
+            noise: vec![0.0; m],
             reach: vec![0.0; n + late + m],
             moved: vec![0.0; n],
             records: false,
@@ -281,14 +286,23 @@ impl<'a> Tube<'a> {
         let Some(gain) = gain else { return Ok(()) };
         for j in 0..n {
             // The law itself rounds too.
-            let error = self.unseen[j] + 8.0 * f64::EPSILON * (z[j].abs() + sizes[j]);
-            let asked = (0..m).map(|i| gain[i * n + j] * error);
-            let late = asked.clone().map(|asked| -asked).take(self.late);
-            self.set.push((0..n).map(|_| 0.0).chain(late).chain(asked));
+            self.unseen[j] += 8.0 * f64::EPSILON * (z[j].abs() + sizes[j]);
+        }
+        let mut noises = vec![0.0; m];
+        if self.late > 0 {
+            for ((noise, largest), gain) in noises.iter_mut().zip(&mut self.noise).zip(gain.chunks_exact(n)) {
+                *noise = gain.iter().zip(&self.unseen).map(|(gain, error)| gain.abs() * error).sum();
+                *largest = largest.max(*noise);
+            }
+        } else {
+            for j in 0..n {
+                let asked = (0..m).map(|i| gain[i * n + j] * self.unseen[j]);
+                self.set.push((0..n).map(|_| 0.0).chain(asked));
+            }
         }
         self.set.reach(&mut self.reach);
         for (i, v) in v.iter().enumerate() {
-            let share = self.reach[kept + i] * (1.0 + ROUND_OFF);
+            let share = (self.reach[kept + i] + noises[i]) * (1.0 + ROUND_OFF);
             self.lacks.feedback[i] = self.lacks.feedback[i].max(share);
             let over = (v + share - self.bounds.max[i]).max(self.bounds.min[i] - v + share);
             // NaN is not within bounds.
@@ -325,7 +339,7 @@ impl<'a> Tube<'a> {
     ) -> bool {
         let Piece { path, over, dt, u } = piece;
         let ([n, m], kept) = (self.dims, self.dims[0] + self.late);
-        let Self { of, set, late, reach, moved, plant, rooms, .. } = self;
+        let Self { of, set, late, noise, reach, moved, plant, rooms, .. } = self;
         let Rooms { variables, rates, at: here, slopes, curvatures, moves, .. } = rooms;
         rates.resize(n, Second::from(0.0));
         let evaluate = |variables: &[Second], out: &mut [Second]| {
@@ -353,13 +367,13 @@ impl<'a> Tube<'a> {
                 let (part, half) = (0.5 * (least + largest), 0.5 * (largest - least) * (1.0 + 1e-15));
                 let late = if *late > 0 { reach[n + i] } else { 0.0 };
                 let (mean, differs) = middle(of.remains_on_average(i, dt));
-                let (asked, fixed) = (reach[kept + i], (part - 1.0) * u[i]);
+                let (asked, fixed) = (reach[kept + i] + noise[i], (part - 1.0) * u[i]);
                 let gained = half * (u[i].abs() + asked + late);
                 Arrives {
                     part,
                     mean,
                     fixed,
-                    spread: gained + part * differs * late,
+                    spread: gained + part * (differs * late + noise[i]),
                     changes: part * late,
                     most: (part * (asked + late) + fixed.abs() + gained) * (1.0 + ROUND_OFF),
                 }
@@ -511,7 +525,7 @@ impl<'a> Tube<'a> {
     /// `most`: ε′ ≥ ε + d (|M| ε′ + w + |N| (γ − 1) u) wherever the two are.
     fn predict(&mut self, model: &dyn Predict, piece: Piece<'_>, most: &[f64]) {
         let [n, m] = self.dims;
-        let Self { of, delay, next_unseen, plant, rooms, late, reach, .. } = self;
+        let Self { of, delay, next_unseen, plant, rooms, late, noise, reach, .. } = self;
         let Rooms { variables, rates, at: here, slopes, .. } = rooms;
         let evaluate = |variables: &[Second], out: &mut [Second]| {
             let (x, u) = variables.split_at(n);
@@ -521,7 +535,9 @@ impl<'a> Tube<'a> {
         let lost = |j: usize| {
             let [least, largest] = of.gains[j];
             let late = if *late > 0 { reach[n + j] } else { 0.0 };
-            late + (1.0 - least).abs().max((largest - 1.0).abs()) * (piece.u[j].abs() + most[n + j] + late)
+            2.0 * noise[j]
+                + late
+                + (1.0 - least).abs().max((largest - 1.0).abs()) * (piece.u[j].abs() + most[n + j])
         };
         let mut guess: Vec<f64> =
             (0..n).map(|i| 2.0 * of.errors[i] + 2.0 * *delay * of.rates[i] + LEAST).collect();

@@ -113,8 +113,8 @@ const SIGHT: f64 = 1.0;
 /// The part of the feedback of an input, of half the width of its bounds, that has the price 1.
 const PART: f64 = 0.25;
 /// Factors on the prices of the states that an input moves at once, and of the others, that are tried in turn. With the first
-/// a vehicle is damped; with the second it is held more tightly.
-pub(in crate::plan) const PRICES: [[f64; 2]; 2] = [[2.0, 0.4], [1.0, 1.0]];
+/// a vehicle is damped; with the second it is held more tightly, with the third more loosely, as a slow motor needs it.
+pub(in crate::plan) const PRICES: [[f64; 2]; 3] = [[2.0, 0.4], [1.0, 1.0], [0.5, 0.1]];
 /// A state is moved at once if its rate, for as long as one sees, is at least this part of what moves it in that time.
 const AT_ONCE: f64 = 0.3;
 
