@@ -448,6 +448,60 @@ fn what_cannot_be_kept_is_refused() {
     assert!(!outcome.accepted && outcome.failure.contains("uncertain"), "{outcome:?}");
 }
 
+/// Without a measurement no law holds an uncertain plant: the flag falls until there is one again.
+#[test]
+fn a_state_that_is_missing_suspends_the_promise() {
+    let mut draws = Draws(9);
+    let (case, declared) = (Case::draw(&mut draws, [4.0, 1.5], false), Declared::all(false));
+    let (mut filter, mut x, mut u) = (case.filter(Unicycle, Some(&declared)), case.x, [0.0; 2]);
+    for step in 0..20_u32 {
+        let mut measured = x;
+        if step == 10 {
+            measured[1] = f64::NAN;
+        }
+        let report = filter.step(f64::from(step) * PERIOD, &measured, &[0.0; 2], &mut u).unwrap();
+        assert_eq!(report.assurance.unwrap().is_assured(), step != 10, "{step}: {:?}", report.assurance);
+        let rate = Unicycle.derivative(&x, &u);
+        x = core::array::from_fn(|i| x[i] + PERIOD * rate[i]);
+    }
+}
+
+/// Samples beside those of the law are no samples of the law: they have a plan of their own, or none. None keeps the flag on
+/// what was checked for other times, so no run is broken.
+#[test]
+fn samples_at_other_times_have_a_plan_of_their_own() {
+    let mut draws = Draws(12);
+    for k in 0..3 {
+        let (case, declared) = (Case::draw(&mut draws, [4.0, 4.0], true), Declared::all(true));
+        let (mut filter, mut x, mut u) = (case.filter(PointMass, Some(&declared)), case.x, [0.0; 2]);
+        let (mut t, mut assured) = (0.0, 0);
+        for _ in 0..400 {
+            let hold = PERIOD * [1.0, 0.5, 0.25, 0.7][(draws.part() * 4.0) as usize];
+            filter.expect_hold(Some(hold)).unwrap();
+            let sides = Sides::of(|| draws.sign());
+            let measured: [f64; 4] = core::array::from_fn(|i| x[i] + declared.errors[i] * sides.errors[i]);
+            let u_ref = [4.0 * draws.sign(), 4.0 * draws.sign()];
+            let report = filter.step(t, &measured, &u_ref, &mut u).unwrap();
+            let guaranteed: Vec<bool> = report.barriers.iter().map(|b| b.guaranteed).collect();
+            assured += u32::from(report.assurance.unwrap().is_assured());
+            for _ in 0..PARTS {
+                let h = hold / f64::from(PARTS);
+                let v: [f64; 2] =
+                    core::array::from_fn(|i| u[i] * (1.0 + 0.05 * sides.gains[i]) + 0.1 * sides.rates[i]);
+                for i in 0..2 {
+                    x[i] += h * (x[i + 2] + 0.5 * h * v[i]);
+                    x[i + 2] += h * v[i];
+                }
+                t += h;
+                for (j, (h, guaranteed)) in case.h(&x).into_iter().zip(&guaranteed).enumerate() {
+                    assert!(!guaranteed || j == 0 && t < DEADLINE || h >= 0.0, "{k}: {t} {h}");
+                }
+            }
+        }
+        assert!(assured > 100, "{k}: {assured}");
+    }
+}
+
 /// A filter that is restored continues as one that was not interrupted, to the last bit.
 #[test]
 fn a_restored_filter_continues_the_law() {

@@ -145,13 +145,18 @@ impl Planning<'_> {
             && !self.is_ruled_out(&promises, at.0, x)
         {
             // A plan that keeps an earlier deadline keeps a later one, though another search may find it.
-            let mut earlier =
-                shorter.iter().filter_map(|part| search(&self.sooner(&promises, at.0, *part)).ok());
+            // One that ends before the deadlines themselves does not keep them.
+            let reaches = |plan: &Plan| promises.iter().flatten().all(|p| p.from < plan.backup_plan.until);
+            let mut earlier = shorter
+                .iter()
+                .filter_map(|part| search(&self.sooner(&promises, at.0, *part)).ok().filter(reaches));
             found = earlier.next().map_or(found, Ok);
         }
         let Err(failure) = found else { return found.map(|plan| First { promises, plan, is_old: false }) };
         let old = &self.before().plan;
-        if self.before().status != AssuranceStatus::Undecided || old.is_empty() {
+        // A law in a tube was checked for what was promised then.
+        let is_bound = self.uncertainty.is_some();
+        if self.before().status != AssuranceStatus::Undecided || old.is_empty() || is_bound {
             return Err(failure);
         }
         promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);

@@ -464,11 +464,13 @@ impl Decision<'_> {
                 *u = self.bounds.clamp(i, input[i]);
             }
         }
-        let is_lost = is_over || !self.before().is_regular(t, hold);
+        // An uncertain plant stays near a plan by measurements alone.
+        let is_lost = is_over || !self.before().is_regular(t, hold) || self.uncertainty.is_some();
         if is_lost && self.now().status == AssuranceStatus::Undecided {
             self.next().plan = Plan::default();
         } else if is_lost {
-            self.end(if is_over { AssuranceStatus::Lost } else { AssuranceStatus::Irregular }, None);
+            let is_blind = is_over || self.uncertainty.is_some();
+            self.end(if is_blind { AssuranceStatus::Lost } else { AssuranceStatus::Irregular }, None);
         }
         Driver::Plan
     }
