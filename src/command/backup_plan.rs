@@ -48,8 +48,11 @@ pub(super) struct BackupPlanReport {
 struct PlanReport {
     /// Time in s from which the plant is at an equilibrium, if the plan ends at one.
     at_equilibrium_from: Option<f64>,
-    /// Time in s until which it keeps every promise, if it ends in motion.
+    /// Time in s until which it keeps every promise, if it ends.
     until: Option<f64>,
+    /// Whether it is for an uncertain plant.
+    #[serde(skip)]
+    covers: bool,
     /// The largest magnitude of each input, with its unit and bounds.
     inputs: Vec<(String, f64, String, [f64; 2])>,
     /// The barrier with the least h above its margin, the time in s, that difference, and its unit.
@@ -94,6 +97,7 @@ pub(super) fn find(
             .is_infinite()
             .then(|| backup_plan.inputs.last().map_or(t, |(end, _)| *end)),
         until: Some(backup_plan.until).filter(|until| until.is_finite()),
+        covers: !c.covered().is_empty(),
         inputs: inputs
             .iter()
             .enumerate()
@@ -246,7 +250,9 @@ impl BackupPlanReport {
             let ending = match (plan.at_equilibrium_from, plan.until) {
                 (Some(from), _) => format!("at an equilibrium from {} s", number(from)),
                 (None, until) => {
-                    format!("until {} s, ending in motion", number_below(until.unwrap_or(f64::NAN)))
+                    let ending =
+                        if plan.covers { "with every plant that it covers" } else { "ending in motion" };
+                    format!("until {} s, {ending}", number_below(until.unwrap_or(f64::NAN)))
                 }
             };
             lines.push(format!("{of}: {ending}; {}", inputs.join(", ")));

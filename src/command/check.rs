@@ -69,6 +69,8 @@ struct FilterReport {
     step: f64,
     /// Why the filter follows no plans; `null` if it does.
     no_plans: Option<String>,
+    /// For which plants plans keep the promises; empty if for the model alone.
+    covers: Vec<String>,
     barriers: Vec<BarrierReport>,
     /// The start given, by state.
     start: Option<Vec<(String, f64)>>,
@@ -508,6 +510,7 @@ fn filter(
         model: c.plant.name(),
         step,
         no_plans: (!c.is_assured()).then(|| c.unassured()),
+        covers: if c.is_assured() { c.covered() } else { Vec::new() },
         barriers,
         start: start.map(|x0| measured(c).into_iter().zip(x0).collect()),
         status,
@@ -694,6 +697,13 @@ fn filter_text(report: &FilterReport) -> String {
         None => "plans: followed, so that what is promised is kept whatever u_ref is".to_owned(),
         Some(reason) => format!("plans: none, since {reason}"),
     });
+    if report.no_plans.is_none() {
+        lines.push(match &report.covers[..] {
+            [] => "assumes: the plant is the model, measured exactly, without delay; declare [uncertainty] otherwise"
+                .to_owned(),
+            covers => format!("covers: {}", covers.join("; ")),
+        });
+    }
     if let Some(start) = &report.start {
         let state: Vec<_> =
             start.iter().map(|(name, value)| format!("{name} = {}", number(*value))).collect();

@@ -426,6 +426,31 @@ fn two_vehicles_in_one_model_avoid_each_other() {
     assert!(nearest >= 3.0, "{nearest} m");
 }
 
+/// Wind, errors and weak inputs, all declared: the promise is kept, and never withdrawn.
+#[test]
+fn a_vehicle_that_is_not_its_model_keeps_its_promise() {
+    let workshop = Workshop::new();
+    workshop.write("windy.toml", fs::read(examples().join("windy.toml")).expect("the example"));
+    let checked = workshop.punctual(["check", "windy.toml"]).success();
+    let covers = "covers: rates theta 0.02 rad/s, v 0.1 m/s2; \
+                  measurement errors x_p 0.02 m, y_p 0.02 m, theta 0.01 rad, v 0.02 m/s; \
+                  gain of a 0.95 to 1.05; gain of omega 0.95 to 1.05\n";
+    assert!(checked.contains(covers), "{checked}");
+    workshop.punctual(["run", "windy.toml", "--require", "on_time_and_inside"]).success();
+    let table = Table::parse(&workshop.text("windy/windy.csv"));
+    for barrier in ["goal", "rock"] {
+        let guaranteed = table.column(&format!("filter.{barrier}.guaranteed"));
+        assert!(guaranteed.iter().all(|g| *g == 1.0), "{barrier}: {guaranteed:?}");
+    }
+    // The end of the promise moves on.
+    let (time, until) = (table.column("time"), table.column("filter.assured_until"));
+    assert!(time.iter().zip(&until).all(|(time, until)| until > time), "{until:?}");
+    // A sum of holds is rounded.
+    const ROUND_OFF: f64 = 1e-12;
+    assert!(until.is_sorted_by(|before, after| *after >= before - ROUND_OFF), "{until:?}");
+    assert!(until[0] < time[time.len() - 1], "{until:?}");
+}
+
 /// A set that moves forever has no plan that ends at rest. The message names the key that helps.
 #[test]
 fn a_set_that_moves_asks_for_a_horizon() {

@@ -97,17 +97,16 @@ fn what_cannot_be_promised_is_refused() {
 #[test]
 fn what_no_plan_accounts_for_is_an_error() {
     let workshop = Workshop::new();
-    for (more, wanted) in [
-        ("actuation_delay = 0.01", "actuation_delay is 0.01, must be 0 for a plan"),
-        (
-            "sampling = \"measured\"\nmeasurement_errors = { v = 0.1 }",
-            "measurement_errors.v is 0.1, must be 0 for a plan",
-        ),
-    ] {
-        workshop.write("filter.toml", filter("on", 8.0, more));
+    let told = |text: String, wanted: &str| {
+        workshop.write("filter.toml", text);
         let message = format!("filter.toml: assurance: is \"on\", must be \"off\": {wanted}");
         workshop.punctual(["check", "filter.toml"]).fails(2, &message);
-    }
+    };
+    told(filter("on", 8.0, "actuation_delay = 0.01"), "actuation_delay is 0.01, must be 0 for a plan");
+    told(
+        declared("on", "", "disturbance = 0.2"),
+        "tree.disturbance is 0.2, must be 0 for a plan; plans account for `rates` of [uncertainty] in its place",
+    );
     let followed = filter("on", 8.0, "").replace("name = \"tree\"", "name = \"tree\"\ncentre_input = true");
     workshop.write("filter.toml", followed);
     workshop.punctual(["check", "filter.toml"]).fails_like(
@@ -141,6 +140,47 @@ fn plans_are_followed_where_that_is_possible() {
         "{}",
         line(&moving)
     );
+}
+
+/// What a file declares of the plant is covered by its plans, and `check` says so; without plans it is refused.
+#[test]
+fn an_uncertain_plant_is_promised_with_plans_alone() {
+    let workshop = Workshop::new();
+    let uncertain = "uncertainty = { rates = { theta = 0.02, v = 0.1 }, inputs = { a = { gain = [0.95, 1.0] } } }\n\
+                     measurement_errors = { x_p = 0.02, v = 0.01 }";
+    let third = |text: &str| text.lines().nth(2).unwrap_or_default().to_owned();
+    workshop.write("filter.toml", filter("auto", 8.0, uncertain));
+    let done = workshop.punctual(["check", "filter.toml", "--x0", "v=1.0"]);
+    assert_eq!((done.code, &done.stderr[..]), (0, ""), "{done:#?}");
+    let covers = "covers: rates theta 0.02 rad/s, v 0.1 m/s2; measurement errors x_p 0.02 m, v 0.01 m/s; gain of a 0.95 to 1";
+    assert_eq!(third(&done.stdout), covers);
+    assert!(done.stdout.contains("; guaranteed until "), "{}", done.stdout);
+    assert!(done.stdout.contains(" s, with every plant that it covers; a "), "{}", done.stdout);
+    workshop.write("filter.toml", filter("off", 8.0, uncertain));
+    workshop.punctual(["check", "filter.toml"]).fails(
+        2,
+        "filter.toml: uncertainty: only plans account for it, and none are followed: assurance is \"off\". Change that, or leave \
+         `[uncertainty]` out",
+    );
+    // Errors of the measurement are accounted for by the rows as well.
+    let errors = "measurement_errors = { x_p = 0.02, v = 0.01 }";
+    workshop.write("filter.toml", filter("off", 8.0, errors));
+    let text = workshop.punctual(["check", "filter.toml"]).success();
+    assert!(!text.contains("covers: ") && !text.contains("assumes: "), "{text}");
+    // Nothing declared is an assumption.
+    workshop.write("filter.toml", filter("auto", 8.0, ""));
+    let text = workshop.punctual(["check", "filter.toml"]).success();
+    assert!(third(&text).starts_with("assumes: the plant is the model, measured exactly, "), "{text}");
+}
+
+/// More than the bounds can counter is refused, with the name of what is missing.
+#[test]
+fn more_uncertainty_than_the_bounds_can_counter_is_refused() {
+    let workshop = Workshop::new();
+    workshop.write("filter.toml", filter("auto", 8.0, "uncertainty.rates = { v = 5.0 }"));
+    let done = workshop.punctual(["check", "filter.toml", "--x0", "v=1.0"]);
+    assert_eq!(done.code, 1, "{done:#?}");
+    assert!(done.stdout.contains("backup plan: NONE was found: "), "{}", done.stdout);
 }
 
 /// A campaign counts how the guarantee held, and each of its rows equals `punctual run`'s.
@@ -210,9 +250,8 @@ fn starts_that_can_be_promised_are_drawn() {
 }
 
 /// The content of a file, and the keys that the warning must name because plans do not support them.
-const DECLARED: [(&str, &str, &[&str]); 9] = [
+const DECLARED: [(&str, &str, &[&str]); 8] = [
     ("actuation_delay = 0.05", "", &["actuation_delay is 0.05, "]),
-    ("measurement_errors = { v = 0.1, x_p = 0.0 }", "", &["measurement_errors.v is 0.1, "]),
     ("", "disturbance = 0.2", &["tree.disturbance is 0.2, "]),
     ("", "begin = 1.0\ndeadline = 9.0", &["tree.begin is 1, "]),
     ("", "after = \"goal\"", &["tree.after is \"goal\", "]),
@@ -225,8 +264,8 @@ const DECLARED: [(&str, &str, &[&str]); 9] = [
     ),
     (
         "measurement_errors = { v = 0.1 }",
-        "begin = 2.0\ndeadline = 9.0",
-        &["measurement_errors.v", "tree.begin is 2, "],
+        "disturbance = 0.1\nbegin = 2.0\ndeadline = 9.0",
+        &["tree.disturbance is 0.1, ", "tree.begin is 2, "],
     ),
 ];
 

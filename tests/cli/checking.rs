@@ -293,7 +293,7 @@ fn a_plan_keeps_every_promise_or_is_not_found() {
     // What plans do not support is reported, in the text as a reason of any kind.
     let (backup_plan, text) = with("8.0", "\ndisturbance = 0.1 #");
     let text = text();
-    let reason = "goal.disturbance is 0.1, must be 0 for a plan";
+    let reason = "goal.disturbance is 0.1, must be 0 for a plan; plans account for `rates` of [uncertainty] in its place";
     assert_eq!(
         (&backup_plan["found"], &backup_plan["reason"]),
         (&false.into(), &reason.into()),

@@ -1,6 +1,7 @@
 """`build`, `check`, `variables` and `run_cli`: the command line by way of the package."""
 
 import copy
+import math
 import pickle
 import shutil
 import subprocess
@@ -119,12 +120,11 @@ def test_the_command_line_is_there(tmp_path):
 
 DECLARED = {
     "actuation_delay": {"actuation_delay": STEP},
-    "measurement_errors": {"measurement_errors": {"v": 0.01}},
     "disturbance": {"barrier": [barrier | {"disturbance": 0.01} for barrier in ASSURED["barrier"]]},
 }
 
 
-@pytest.mark.parametrize("keys", [["actuation_delay"], ["measurement_errors"], ["measurement_errors", "disturbance"]])
+@pytest.mark.parametrize("keys", [["actuation_delay"], ["disturbance"], ["actuation_delay", "disturbance"]])
 def test_what_switches_plans_off_is_a_warning_once_for_each_that_is_made(keys, tmp_path):
     lost = ASSURED | {name: value for key in keys for name, value in DECLARED[key].items()}
     filter_fmu, plant_fmu = tmp_path / "filter.fmu", punctual.build(PLANT, tmp_path / "plant.fmu")
@@ -155,3 +155,26 @@ def test_what_switches_plans_off_is_a_warning_once_for_each_that_is_made(keys, t
         copy.copy(own), pickle.loads(pickle.dumps(own))
     with pytest.raises(punctual.Error, match="assurance: is .on., must be"):
         punctual.Filter(lost | {"assurance": "on"})
+
+
+def test_what_is_declared_of_the_plant_is_covered():
+    declared = {
+        "uncertainty": {"rates": {"v": np.float64(0.05)}, "inputs": {"a": {"gain": np.array([0.95, 1.0])}}},
+        "measurement_errors": {"x_p": 0.01},
+    }
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        own = punctual.Filter(ASSURED | declared)
+    # `check` says the same of the dict.
+    covers = punctual.check(ASSURED | declared)["covers"]
+    assert covers == ["rates v 0.05 m/s2", "measurement errors x_p 0.01 m", "gain of a 0.95 to 1"]
+    with pytest.raises(punctual.Error, match="uncertainty.inputs.a.gain: is .1, 0.9., must be"):
+        punctual.Filter(ASSURED | {"uncertainty": {"inputs": {"a": {"gain": [1.0, 0.9]}}}})
+    with pytest.raises(punctual.Error, match="^uncertainty: only plans account for it"):
+        punctual.Filter(ASSURED | declared | {"assurance": "off"})
+    again = pickle.loads(pickle.dumps(own))
+    x, u_ref = [0.0] * len(own.states), [0.0] * len(own.inputs)
+    step, other = own.step(0.0, x, u_ref), again.step(0.0, x, u_ref)
+    assert step.assurance == other.assurance and (step.u == other.u).all()
+    if step.assurance == punctual.Assurance.ASSURED:
+        assert math.isfinite(step.assured_until)

@@ -164,6 +164,7 @@ fn schema_of_value(value: Value) -> Json {
             json!({ "type": ["string", "object"], "additionalProperties": { "type": "string" } })
         }
         Value::Table(section) => json!({ "allOf": [definition(section.name)] }),
+        Value::TableByName(section) => by_name(definition(section.name)),
         Value::Tables(section) => many(definition(section.name)),
     }
 }

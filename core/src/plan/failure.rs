@@ -96,9 +96,19 @@ pub trait Names {
         format!("input {input}")
     }
 
+    /// A difference of an input, with its unit.
+    fn input_amount(&self, _input: usize, value: f64) -> String {
+        value.to_string()
+    }
+
     /// The name of a state.
     fn state(&self, state: usize) -> String {
         format!("state {state}")
+    }
+
+    /// A difference of a state, with its unit.
+    fn state_amount(&self, _state: usize, value: f64) -> String {
+        value.to_string()
     }
 
     /// The statement that no state meets two barriers.
@@ -148,16 +158,18 @@ impl fmt::Display for Named<'_> {
             }
             Failure::NoReserve { input, missing } => write!(
                 f,
-                "the bounds of {} leave too little to hold the uncertain plant near the plan, by {missing}",
-                names.input(input)
+                "the bounds of {} leave too little to hold the uncertain plant near the plan, by {}",
+                names.input(input),
+                names.input_amount(input, missing)
             ),
             Failure::Spreads => {
                 f.write_str("no feedback holds the uncertain plant near the plan: its deviation grows without end")
             }
             Failure::Undeclared { state, beyond } => write!(
                 f,
-                "{} is {beyond} farther from the plan than the declared uncertainty allows",
-                names.state(state)
+                "{} is {} farther from the plan than the declared uncertainty allows",
+                names.state(state),
+                names.state_amount(state, beyond)
             ),
             Failure::NoRest => f.write_str("the plant does not reach an equilibrium, or a set moves"),
             Failure::Unsteady => f.write_str(

@@ -81,6 +81,12 @@ impl FilterConfiguration {
         // Rows alone refuse some of what was taken here.
         let is_certain = self.is_assured() || built.is_ok() && mixed_degree.is_empty();
         let filter = if is_certain { built } else { self.build() }?;
+        if let (Backing::RowsOnly(reason), Some(_)) = (&self.findings.backing, &self.uncertainty) {
+            let message = format!(
+                "only plans account for it, and none are followed: {reason}. Change that, or leave `[uncertainty]` out"
+            );
+            return Err(ConfigurationError::new("uncertainty", message));
+        }
         self.findings.degrees = filter.relative_degrees().collect();
         self.findings.mixed_degree = mixed_degree;
         Ok(filter)
@@ -118,9 +124,10 @@ impl FilterConfiguration {
         self.findings.backing == Backing::Plans
     }
 
-    /// Whether its plans may end in motion, so that it reports until when it promises.
+    /// Whether its plans may end before the end of time, in motion or with an uncertain plant, so that it reports until when
+    /// it promises.
     pub fn ends_plans(&self) -> bool {
-        self.is_assured() && self.plan_horizon.is_some()
+        self.is_assured() && (self.plan_horizon.is_some() || self.declares_uncertainty())
     }
 
     /// Why the filter follows no plans, in words; empty where it does.
@@ -202,10 +209,14 @@ impl FilterConfiguration {
 
     /// How plans are made, but for a policy.
     fn plans(&self) -> Plans {
-        Plans::every(self.experiment.step_size)
+        let plans = Plans::every(self.experiment.step_size)
             .horizon(self.plan_horizon)
             .search_budget(self.search_budget.unwrap_or(Plans::SEARCH_BUDGET))
-            .apart(self.apart())
+            .apart(self.apart());
+        match &self.uncertainty {
+            Some(uncertainty) => uncertainty.declared(&self.plant, plans),
+            None => plans,
+        }
     }
 
     /// What keeps plans from being put behind `filter`, built from this configuration: each with its key, in words.
@@ -221,24 +232,31 @@ impl FilterConfiguration {
                 input.name
             ));
         }
+        // `filter` may be the rows alone, before the integrator is put behind them.
+        if self.integrator.is_some() && !self.covered().is_empty() {
+            let declared = self.declarations();
+            found.push(format!("no plan accounts yet for {declared} behind an [integrator]"));
+        }
         for error in filter.obstacles(&self.plans()) {
             let (field, message) = (error.field(), error.message());
             let of = |key: &str| {
                 let name = field.strip_suffix(key)?.strip_suffix('.')?;
                 self.barrier.iter().find(|barrier| barrier.name == name)
             };
-            if field == "measurement_errors" {
-                let errors = self.measurement_errors.iter().filter(|(_, error)| **error > 0.0);
-                found.extend(
-                    errors.map(|(state, error)| format!("{field}.{state} is {error}, must be 0 for a plan")),
-                );
+            if ["integrator", "measured"].contains(&field) {
+                // Named above.
+            } else if of("disturbance").is_some() {
+                found.push(format!(
+                    "{field} {message}; plans account for `rates` of [uncertainty] in its place"
+                ));
             } else if let Some((name, after)) = of("begin").and_then(|b| Some((&b.name, b.after.as_ref()?))) {
                 found.push(format!("{name}.after is {after:?}, and no plan predicts when that is reached"));
             } else if let Some(barrier) = of("source") {
                 // No key has this name. What follows another thing moves as that does; what moves by itself wants the key of a
                 // horizon.
                 if follows.is_empty() {
-                    found.push(format!("{} {message} (`plan_horizon`)", barrier.name));
+                    let key = if message.starts_with("moves") { " (`plan_horizon`)" } else { "" };
+                    found.push(format!("{} {message}{key}", barrier.name));
                 }
             } else {
                 found.push(format!("{field} {message}"));

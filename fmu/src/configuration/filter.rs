@@ -23,7 +23,7 @@ use super::words::words;
 use super::{
     BarrierInput, BarrierSection, ConfigurationError, DisturbanceSection, EXPERIMENT, ExperimentSection,
     IntegrationSection, IntegratorSection, Parameter, PlantSection, PluginLoader, Range, RunSection,
-    VariableSection, barrier, integrator, model, plant,
+    UncertaintySection, VariableSection, barrier, integrator, model, plant, uncertainty,
 };
 use crate::text::{number, quantity, shown_unit};
 
@@ -79,6 +79,7 @@ pub(super) struct RawFilter {
     bounds: BTreeMap<String, [f64; 2]>,
     #[serde(default)]
     measurement_errors: BTreeMap<String, f64>,
+    uncertainty: Option<UncertaintySection>,
     #[serde(default)]
     experiment: ExperimentSection,
     #[serde(default)]
@@ -140,10 +141,13 @@ pub struct FilterConfiguration {
     pub barrier: Vec<BarrierSection>,
     /// Input bounds by name, `[min, max]` in the unit of the input; none is ±1e30.
     pub bounds: BTreeMap<String, [f64; 2]>,
-    /// Bounds on the errors of the measured states, by name, in their units. The promises then hold for the true state, to first
-    /// order in them.
+    /// Bounds on the errors of the measured states, by name, in their units. The promises then hold for the true state: those of
+    /// plans exactly, those of the rows to first order in the errors.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub measurement_errors: BTreeMap<String, f64>,
+    /// How the plant may differ from the model. The promises then hold for every such plant.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<UncertaintySection>,
     /// The run that it is meant for.
     pub experiment: ExperimentSection,
     /// What a run of this file alone has besides. It is no part of the FMU.
@@ -175,7 +179,7 @@ fn correction_limit() -> f64 {
 pub(super) static SECTION: Section = Section {
     name: "filter",
     keys: || {
-        static KEYS: [Key; 23] = [
+        static KEYS: [Key; 24] = [
             Key::new("kind", Word(&["filter"]), None, ""),
             Key::new("name", Name, Some("`filter`"), "the FMU's name"),
             Key::new("plant", Table(&model::PLANT), None, "[the model](#models) that the filter is for"),
@@ -201,14 +205,16 @@ pub(super) static SECTION: Section = Section {
                 Some("`auto`"),
                 "`on`: the filter promises only what a plan within the bounds keeps, whatever u_ref is, and follows it where it \
                  must ([guarantees](guarantees.md#will-it-always)). The plan is sought at the first step; if none is found, \
-                 nothing is promised. Needs a model to run ahead, sets that stay where they are, no delay, no errors. `off`: the rows \
+                 nothing is promised. Needs a model to run ahead, sets that stay where they are, no delay. `off`: the rows \
                  alone. `auto`: `on` where that is possible and every input has bounds, else `off`. Where every input has bounds, a \
                  warning names the keys that switch it off for all barriers",
             ),
             Key::new(
                 "plan_horizon",
                 Number(Is("s"), Range::POSITIVE),
-                Some("none: every plan ends at an equilibrium"),
+                Some(
+                    "none: every plan ends at an equilibrium. With `[uncertainty]` or `[measurement_errors]` its promise ends all the same, 3 s past the last deadline and the present",
+                ),
                 "if no plan ends at an equilibrium, as for an aeroplane or a set that moves for ever: how far a plan has to reach \
                  past the last deadline and the present. The promise holds until its end, `assured_until`. It is extended before it ends, if a \
                  longer plan is found",
@@ -246,8 +252,15 @@ pub(super) static SECTION: Section = Section {
                 "measurement_errors",
                 NumberByName(Of("unit of the state"), Range::NON_NEGATIVE),
                 Some("none"),
-                "largest error of a measured state, by name: the promise then holds for the true state, to first order \
-                 ([theory](theory.md#measurement-errors)). Needs the reference profile, prediction over the period, no delay",
+                "largest error of a measured state, by name: the promise then holds for the true state. Plans account for it \
+                 ([below](#uncertainty)), and so do the rows, to first order ([theory](theory.md#measurement-errors)). Needs the \
+                 reference profile, prediction over the period, no delay",
+            ),
+            Key::new(
+                "uncertainty",
+                Table(&uncertainty::SECTION),
+                Some("none: the plant is the model"),
+                "[how the plant may differ from the model](#uncertainty); only plans account for it",
             ),
             Key::new(
                 "integrator",
@@ -372,6 +385,7 @@ impl FilterConfiguration {
             policy: raw.policy,
             bounds: raw.bounds,
             measurement_errors: raw.measurement_errors,
+            uncertainty: raw.uncertainty,
             experiment: raw.experiment,
             run: Box::new(RunSection {
                 x0: raw.x0,
@@ -389,6 +403,9 @@ impl FilterConfiguration {
         configuration.complete_bounds()?;
         let states = configuration.measured_states();
         check_known("measurement_errors", &configuration.measurement_errors, "measured state", &states)?;
+        if let Some(uncertainty) = &configuration.uncertainty {
+            uncertainty.check(&configuration.plant)?;
+        }
         // Check every number by itself.
         configuration.experiment.check()?;
         for parameter in configuration.parameters() {
@@ -503,6 +520,8 @@ impl FilterConfiguration {
                 move |c: &mut Self| c.measurement_errors.get_mut(&state.name),
             ));
         }
+        let uncertainty = self.uncertainty.iter();
+        rows.extend(uncertainty.flat_map(|uncertainty| uncertainty.parameters(&self.plant)));
         let integrator = self.integrator.iter();
         rows.extend(integrator.flat_map(|i| i.parameters(&self.plant, |c: &mut Self| c.integrator.as_mut())));
         for (i, barrier) in self.barrier.iter().enumerate() {
@@ -587,6 +606,9 @@ impl FilterConfiguration {
         let mut errors = vec![0.0; states + self.barrier_inputs().len()];
         for (error, state) in errors.iter_mut().zip(self.plant.states()) {
             *error = self.measurement_errors.get(&state.name).copied().unwrap_or(0.0);
+        }
+        if let Some(uncertainty) = &self.uncertainty {
+            uncertainty.check_gains()?;
         }
         // The settings of the whole filter.
         builder
@@ -689,7 +711,8 @@ impl FilterConfiguration {
     }
 }
 
-/// Barriers by their names, and after them the limits of the integrator; one of a state from elsewhere may have any number.
+/// Barriers, inputs and states by their names. After the barriers come the limits of the integrator; one of a state from
+/// elsewhere may have any number.
 impl Names for FilterConfiguration {
     fn barrier(&self, barrier: usize) -> String {
         match (self.barrier.get(barrier), &self.integrator) {
@@ -713,6 +736,24 @@ impl Names for FilterConfiguration {
 
     fn time(&self, time: f64) -> String {
         number(time)
+    }
+
+    fn input(&self, input: usize) -> String {
+        self.plant.inputs().into_iter().nth(input).map_or_else(|| "an input".to_owned(), |input| input.name)
+    }
+
+    fn input_amount(&self, input: usize, value: f64) -> String {
+        let unit = self.plant.inputs().into_iter().nth(input).map(|input| input.unit);
+        quantity(value, &unit.unwrap_or_default())
+    }
+
+    fn state(&self, state: usize) -> String {
+        self.plant.states().into_iter().nth(state).map_or_else(|| "a state".to_owned(), |state| state.name)
+    }
+
+    fn state_amount(&self, state: usize, value: f64) -> String {
+        let unit = self.plant.states().into_iter().nth(state).map(|state| state.unit);
+        quantity(value, &unit.unwrap_or_default())
     }
 
     fn apart(&self, barriers: [usize; 2]) -> String {

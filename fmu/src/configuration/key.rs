@@ -60,6 +60,8 @@ pub enum Value {
     TextOrByName,
     /// A table.
     Table(&'static Section),
+    /// A table of tables by name.
+    TableByName(&'static Section),
     /// A list of tables.
     Tables(&'static Section),
 }

@@ -24,6 +24,7 @@ mod plant;
 mod plugin;
 mod read;
 mod reference;
+mod uncertainty;
 mod unit;
 mod words;
 
@@ -45,6 +46,7 @@ pub use plugin::{Plugin, PluginDigest, PluginLoader, PluginSection};
 pub use punctual_models::{Functions, mentions, nearest};
 pub use read::{ConfigurationError, read_toml, write_toml};
 pub use reference::{ModelName, ReferenceSection};
+pub use uncertainty::{UncertainInput, UncertaintySection};
 pub use unit::{base_unit, over_seconds, quantity};
 
 use serde::{Deserialize, Serialize};
@@ -187,13 +189,15 @@ impl Configuration {
 }
 
 /// The files and their tables, each after the tables that contain it.
-pub static SECTIONS: [&Section; 12] = [
+pub static SECTIONS: [&Section; 14] = [
     &filter::SECTION,
     &barrier::SECTION,
     &model::PLANT,
     &model::VARIABLE,
     &model::PARAMETER,
     &integrator::SECTION,
+    &uncertainty::SECTION,
+    &uncertainty::INPUT,
     &plant::SECTION,
     &plant::OUTPUT,
     &plant::INTEGRATION,

@@ -30,7 +30,7 @@ pub(super) enum Named {
 }
 
 /// Names, and first parts of names, of the FMU's own variables.
-const RESERVED: [(&str, &[Named]); 15] = {
+const RESERVED: [(&str, &[Named]); 16] = {
     const BOTH: &[Named] = &[Named::Barrier, Named::Parameter];
     [
         ("x", BOTH),
@@ -44,6 +44,7 @@ const RESERVED: [(&str, &[Named]); 15] = {
         ("rearm", BOTH),
         ("integrator", BOTH),
         ("measurement_error", BOTH),
+        ("uncertainty", BOTH),
         // Parameters may have these names: models with parameters of their own have no such lengths.
         ("l_r", &[Named::Barrier]),
         ("l_f", &[Named::Barrier]),

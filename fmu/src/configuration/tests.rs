@@ -24,6 +24,18 @@ x0 = { v = 1.5 }
 inner_step = 0.01
 "#;
 
+const UNCERTAIN: &str = r#"
+kind = "filter"
+plant = { model = "unicycle" }
+bounds = { a = [-9.0, 8.0], omega = [-2.0, 2.0] }
+uncertainty = { rates = { v = 0.1 }, inputs = { a = { gain = [0.9, 1.0] } } }
+[[barrier]]
+name = "goal"
+centre = [45.0, 44.0]
+radius = 2.0
+deadline = 10.0
+"#;
+
 const STEERED: &str = r#"
 kind = "filter"
 plant = { model = "bicycle_small_slip_rate", l_r = 1.5 }
@@ -97,6 +109,48 @@ defects! {
     measurement_error_of_a_delayed_filter: FILTER,
         "bounds =" => "actuation_delay = 0.001\nmeasurement_errors = { v = 0.1 }\nbounds =",
         "measurement_errors: needs an actuation_delay of 0, it is 0.001";
+    negative_uncertain_rate: UNCERTAIN, "v = 0.1" => "v = -0.1",
+        "uncertainty.rates.v: is -0.1, must be finite and >= 0";
+    infinite_uncertain_rate: UNCERTAIN, "v = 0.1" => "v = inf",
+        "uncertainty.rates.v: is inf, must be finite and >= 0";
+    uncertain_rate_of_no_state: UNCERTAIN, "v = 0.1" => "thetha = 0.1",
+        "uncertainty.rates.thetha: unknown state (did you mean theta?), must be one of x_p, y_p, theta, v";
+    uncertain_input_of_another_plant: UNCERTAIN, "a = { gain" => "beta = { gain",
+        "uncertainty.inputs.beta: unknown input, must be one of a, omega";
+    gain_of_nothing: UNCERTAIN, "[0.9, 1.0]" => "[0.0, 1.0]",
+        "uncertainty.inputs.a.gain[1]: is 0, must be finite and >= 1e-9";
+    gain_that_turns_an_input_around: UNCERTAIN, "[0.9, 1.0]" => "[-0.9, 1.0]",
+        "uncertainty.inputs.a.gain[1]: is -0.9, must be finite and >= 1e-9";
+    gain_that_is_no_number: UNCERTAIN, "[0.9, 1.0]" => "[0.9, nan]",
+        "uncertainty.inputs.a.gain[2]: is NaN, must be finite and >= 1e-9";
+    gain_from_more_to_less: UNCERTAIN, "[0.9, 1.0]" => "[1.1, 0.9]",
+        "uncertainty.inputs.a.gain: is [1.1, 0.9], must be [least, largest] with least <= largest (in an FMU: \
+         uncertainty.gain_min.a, uncertainty.gain_max.a)";
+    gain_with_one_end: UNCERTAIN, "[0.9, 1.0]" => "[0.9]", "uncertainty.inputs.a.gain: has 1 entry, must have 2 (line 5)";
+    uncertain_lag: UNCERTAIN, "gain = [0.9, 1.0]" => "lag = [0.0, 0.1]",
+        "uncertainty.inputs.a.lag: is an unknown key; the keys are gain (line 5)";
+    uncertain_parameters: UNCERTAIN, "rates = { v = 0.1 }" => "parameters = { mass = [1.0, 2.0] }",
+        "uncertainty.parameters: is an unknown key (did you mean rates?) (line 5)";
+    uncertainty_without_plans: UNCERTAIN, "uncertainty =" => "assurance = \"off\"\nuncertainty =",
+        "uncertainty: only plans account for it, and none are followed: assurance is \"off\". Change that, or leave `[uncertainty]` out";
+    uncertainty_without_bounds: UNCERTAIN, ", omega = [-2.0, 2.0]" => "",
+        "uncertainty: only plans account for it, and none are followed: omega has no bounds. Change that, or leave `[uncertainty]` out";
+    uncertainty_beside_a_delay: UNCERTAIN, "uncertainty =" => "actuation_delay = 0.001\nuncertainty =",
+        "uncertainty: only plans account for it, and none are followed: actuation_delay is 0.001, must be 0 for a plan. Change that, \
+         or leave `[uncertainty]` out";
+    uncertainty_beside_a_disturbance: UNCERTAIN, "radius = 2.0" => "radius = 2.0\ndisturbance = 0.2",
+        "uncertainty: only plans account for it, and none are followed: goal.disturbance is 0.2, must be 0 for a plan; plans account \
+         for `rates` of [uncertainty] in its place. Change that, or leave `[uncertainty]` out";
+    uncertainty_beside_an_input_of_a_barrier: UNCERTAIN, "radius = 2.0" => "radius = 2.0\ncentre_input = true",
+        "uncertainty: only plans account for it, and none are followed: a barrier follows goal.centre[1], which is moved from \
+         outside, so that no plan can predict it. Change that, or leave `[uncertainty]` out";
+    uncertainty_behind_an_integrator: STEERED,
+        "bounds = { beta_rate = [-4.0, 4.0] }" =>
+        "bounds = { a = [-4.0, 4.0], beta_rate = [-4.0, 4.0] }\nuncertainty = { rates = { v = 0.1 } }",
+        "uncertainty: only plans account for it, and none are followed: no plan accounts yet for [uncertainty] behind an \
+         [integrator]. Change that, or leave `[uncertainty]` out";
+    barrier_called_uncertainty: UNCERTAIN, "name = \"goal\"" => "name = \"uncertainty\"",
+        "barrier[0].name: is \"uncertainty\", which is already the name of something else";
     disturbance_of_no_input: PLANT, "[integration]" => "[disturbance]\ninputs = { omega = 1.0 }\n[integration]",
         "disturbance.inputs.omega: unknown input, must be one of a, beta";
     disturbance_of_no_state: PLANT, "[integration]" => "[disturbance]\nmeasurements = { w = 1.0 }\n[integration]",
@@ -464,6 +518,8 @@ fn every_key_refuses_other_types_in_plain_words() {
         (model, "variable", &["plant", "inputs"]),
         (model, "parameter", &["plant", "parameters"]),
         (STEERED, "integrator", &["integrator"]),
+        (UNCERTAIN, "uncertainty", &["uncertainty"]),
+        (UNCERTAIN, "uncertain_input", &["uncertainty", "inputs", "a"]),
         (PLANT, "plant", &[]),
         (PLANT, "integration", &["integration"]),
         (&full, "disturbance", &["disturbance"]),
@@ -483,9 +539,11 @@ fn every_key_refuses_other_types_in_plain_words() {
                     Value::Flag => &["flag"],
                     Value::Text | Value::Name | Value::Word(_) => &["text"],
                     Value::TextOrByName => &["text", "table"],
-                    Value::NumberByName(..) | Value::PairByName(_) | Value::TextByName | Value::Table(_) => {
-                        &["table"]
-                    }
+                    Value::NumberByName(..)
+                    | Value::PairByName(_)
+                    | Value::TextByName
+                    | Value::Table(_)
+                    | Value::TableByName(_) => &["table"],
                     Value::Tables(_) => &["tables", "empty"],
                 };
                 // What has the right type is the business of the checks of values.
@@ -576,6 +634,43 @@ fn expressions_of_inputs_are_checked() {
     }
 }
 
+/// A filter for an uncertain plant follows plans, which cover what the file declares, and no more.
+#[test]
+fn what_plans_cover_is_what_the_file_declares() {
+    let read = |text: &str| match Configuration::parse(text) {
+        Ok(Configuration::Filter(filter)) => filter,
+        other => panic!("{other:?}"),
+    };
+    let errors = "measurement_errors = { x_p = 0.02, theta = 0.01 }\n";
+    let filter = read(&UNCERTAIN.replace("uncertainty =", &format!("{errors}uncertainty =")));
+    assert!(filter.is_assured() && filter.ends_plans() && filter.warning().is_none());
+    let wanted = ["rates v 0.1 m/s2", "measurement errors x_p 0.02 m, theta 0.01 rad", "gain of a 0.9 to 1"];
+    assert_eq!(filter.covered(), wanted);
+    // Nothing is nothing, but the FMU has its parameters, and its output of the end.
+    let nothing = read(&UNCERTAIN.replace("0.1", "0.0").replace("[0.9, 1.0]", "[1.0, 1.0]"));
+    assert!(nothing.covered().is_empty() && nothing.ends_plans());
+    let names: Vec<_> = nothing.parameters().into_iter().map(|row| row.name).collect();
+    for name in ["uncertainty.rate.v", "uncertainty.gain_min.a", "uncertainty.gain_max.a"] {
+        assert!(names.iter().any(|own| own == name), "{name}: {names:?}");
+    }
+    // A barrier's disturbance, and errors without plans, are the business of the rows.
+    let rows = read(&FILTER.replace("bounds =", &format!("{errors}bounds =")));
+    assert!(!rows.is_assured() && !rows.ends_plans());
+}
+
+/// Inputs and states have their names and units in the message of a failure.
+#[test]
+fn failures_of_an_uncertain_plant_have_names() {
+    let Ok(Configuration::Filter(filter)) = Configuration::parse(UNCERTAIN) else { panic!("a filter") };
+    let of = |failure| filter.failure(failure);
+    let reserve = of(punctual_core::plan::Failure::NoReserve { input: 1, missing: 0.1 + 0.2 });
+    let wanted =
+        "the bounds of omega leave too little to hold the uncertain plant near the plan, by 0.3 rad/s";
+    assert_eq!(reserve, wanted);
+    let beyond = of(punctual_core::plan::Failure::Undeclared { state: 3, beyond: 0.25 });
+    assert_eq!(beyond, "v is 0.25 m/s farther from the plan than the declared uncertainty allows");
+}
+
 /// Every model.
 const MODELS: [&str; 8] = [
     "point_mass",
@@ -595,6 +690,8 @@ fn every_kind() -> Vec<String> {
     texts.push(EXPRESSIONS.to_owned());
     texts.push(POLICY.to_owned());
     texts.push(FILTER.replace("bounds =", "measurement_errors = { y_p = 0.1, v = 0.2 }\nbounds ="));
+    texts.push(UNCERTAIN.to_owned());
+    texts.push(UNCERTAIN.replace("gain = [0.9, 1.0]", ""));
     texts.push(format!("{FILTER}disturbance = 0.5\n"));
     texts.push(format!("{PLANT}[disturbance]\nseed = 3\ninputs = {{ a = 0.5 }}\nmeasurements.v = 0.1\n"));
     for model in MODELS {

@@ -197,14 +197,17 @@ impl Filter {
     /// u_ref wherever a plan is found behind that. Otherwise it is a compromise, with the answer of the rows once every set
     /// has been reached; or, if nothing else keeps the promise, the next input of the plan itself.
     ///
-    /// Assumptions: the plant is the model, its state is measured exactly, and samples are one period apart. If the plant
+    /// Assumptions: the plant is the model, its state is measured exactly, and samples are one period apart. With
+    /// [rates](Plans::uncertain_rates), [gains](Plans::uncertain_gains) and [measurement
+    /// errors](crate::filter::FilterBuilder::measurement_errors) declared, every plant within them keeps the promise. It then
+    /// has an [end](Assurance::until), which is postponed again and again. If the plant
     /// was seen to differ from the model, and 1.5 times that difference could take it out of a set before the next sample,
     /// the guarantee is lost for that sample. A sample may be repeated at the same time, come early, or come late by a
     /// twentieth of a hold. If the time to the next sample changes and is [known](Self::expect_hold), a plan is sought for
     /// the new one; if none is found, the guarantee is lost. A sample that comes later suspends it until the next one. While
     /// x is not finite, the plan continues as it is. A barrier without a deadline that [begins later](Begin::At) is promised
-    /// from then on. A filter with bounds on disturbance or measurement errors, a delay, or a deadline for a barrier that
-    /// begins later cannot be assured yet, and is refused. Sets must not move, unless [it is
+    /// from then on. A filter with a bound on the disturbance of a barrier, a delay, or a deadline for a barrier that begins
+    /// later cannot be assured yet, and is refused. Sets must not move, unless [it is
     /// known](crate::barrier::Barrier::range_from) how low h gets: at an equilibrium each set is checked at eight later
     /// times, up to a day, and no plan is found if it has moved. With a [horizon](Plans::horizon) they may move, and the
     /// plant needs no equilibrium: the promise then has an [end](Assurance::until), which is postponed again and again.
@@ -233,8 +236,9 @@ impl Filter {
     ///
     /// A number of `plans` out of range; a filter that already has plans. A filter that cannot be assured: a barrier without
     /// a model that can be run ahead, or with another plant than the first one; one with a deadline that begins later, one
-    /// that begins on another's arrival, or without a horizon one that moves for ever; a bound on disturbance or measurement
-    /// errors; a delay. [`Self::obstacles`] lists them all.
+    /// that begins on another's arrival, or without a horizon one that moves for ever; a bound on the disturbance of a barrier;
+    /// a delay; an integrator, measured quantities beside the states, or a source without derivatives on enclosures for an
+    /// uncertain plant. [`Self::obstacles`] lists them all.
     pub fn with_plans(mut self, plans: impl Into<Plans>) -> Result<Self, Error> {
         let plans = plans.into();
         plans.check()?;
@@ -300,6 +304,10 @@ impl Filter {
             }
         }
         found.extend(one_plant(rows).err());
+        // Measured quantities, and a source without a model, were named above.
+        if rows.measured == 0 && rows.slots.iter().all(|slot| slot.source.predict().is_some()) {
+            found.extend(self.uncertainty(plans).err());
+        }
         found
     }
 

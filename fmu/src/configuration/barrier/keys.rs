@@ -147,7 +147,8 @@ static KEYS: [Row; 33] = [
             name: "disturbance",
             value: Number(OfHighestDerivative, Range::NON_NEGATIVE),
             default: Some("0"),
-            meaning: "bound on the model's error in h⁽ⁿ⁾; the promise holds for every error within it",
+            meaning: "bound on the model's error in h⁽ⁿ⁾; the promise of the row holds for every error within it. It switches plans off: \
+                      they account for `rates` of [`[uncertainty]`](#uncertainty) instead",
         },
         parameters: &[whole(
             "bound on the model's error in the derivative of h that the inputs enter",
