@@ -426,15 +426,19 @@ fn a_lag_is_accounted_for() {
     is_kept(&tally("unicycle", Unicycle, [4.0, 1.5], all, 8));
 }
 
-/// A plant far beyond what was declared is not where the law can have led it: the flag falls.
+/// A plant far beyond what was declared is seldom where the law can have led it: the flag falls, and says why.
 #[test]
 fn a_plant_beyond_what_was_declared_loses_the_promise() {
     let mut draws = Draws(8);
     let (case, declared) = (Case::draw(&mut draws, [4.0, 1.5], false), Declared::all(false));
-    let how = Run { adversary: Adversary::Constant, asks: Asks::Zero, seed: 1, time: 4.0, worse: 8.0 };
-    let outcome = run(Unicycle, &case, &declared, &how);
-    assert!(outcome.accepted && outcome.withdrawn > 0, "{outcome:?}");
-    assert!(outcome.failure.contains("declared"), "{outcome:?}");
+    let mut lost = 0;
+    for seed in 0..6 {
+        let how = Run { adversary: Adversary::Corners, asks: Asks::Zero, seed, time: 4.0, worse: 8.0 };
+        let outcome = run(Unicycle, &case, &declared, &how);
+        assert!(outcome.accepted, "{outcome:?}");
+        lost += u32::from(outcome.withdrawn > 0 && outcome.failure.contains("declared uncertainty"));
+    }
+    assert!(lost >= 4, "{lost}");
 }
 
 /// No feedback has bounds enough for a wind that pushes as hard as the inputs do.

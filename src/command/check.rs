@@ -17,6 +17,7 @@ use serde::Serialize;
 use super::backup_plan::{self, BackupPlanReport};
 use super::closed_loop::{self, LoopReport, RatingReport, ReachReport, Verdict, Wanted};
 use super::map::{self, MapReport, Plane};
+use super::robustness::RobustnessReport;
 use crate::output::{self, number};
 
 /// Round-off of h at a start on the boundary, in the unit of h.
@@ -41,6 +42,9 @@ pub struct Arguments {
     /// Also find the profile and rate that need the smallest bound on the accelerations from the start
     #[arg(long)]
     effort: bool,
+    /// Also say how much wind, measurement error and wrong gain the plan from the start bears
+    #[arg(long)]
+    robustness: bool,
     /// Draw which starts can be promised, over two states: "x_p=-5..25,y_p=-5..15"; the others are as in the start, or 0
     #[arg(long, value_name = "RANGES", allow_hyphen_values = true)]
     map: Option<String>,
@@ -93,6 +97,9 @@ struct FilterReport {
     /// Inputs that profiles and rates require, the best first.
     #[serde(skip_serializing_if = "Option::is_none")]
     effort: Option<Vec<RatingReport>>,
+    /// What the plan bears of a plant that is not the model, if requested.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    robustness: Option<RobustnessReport>,
 }
 
 #[derive(Serialize)]
@@ -230,6 +237,10 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 let message = format!("simulates, but barrier {} is external: it has no model", barrier.name);
                 return Err(Error::configuration("--effort", message));
             }
+            if arguments.robustness && start.is_none() {
+                let message = "needs a start: give --plant, --x0, or [x0] in the file";
+                return Err(Error::configuration("--robustness", message));
+            }
             // Simulate and judge. Findings on a start refer to the state at which the filter is armed.
             let arm_after = configuration.arm_after;
             let configuration = configuration.armed_at_once();
@@ -237,6 +248,12 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             let effort = match &start {
                 Some(x0) if arguments.effort => {
                     Some(closed_loop::ratings(&configuration, x0, &wanted).map_err(|e| e.in_file(file))?)
+                }
+                _ => None,
+            };
+            let robustness = match &start {
+                Some(x0) if arguments.robustness => {
+                    RobustnessReport::of(&configuration, x0).map_err(|e| e.in_file(file))?
                 }
                 _ => None,
             };
@@ -250,7 +267,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             let from = start.clone().unwrap_or_else(zeros);
             let mut report =
                 filter(&configuration, start, &wanted, out, arm_after).map_err(|e| e.in_file(file))?;
-            report.effort = effort;
+            (report.effort, report.robustness) = (effort, robustness);
             if let (Some(plane), Some(folder)) = (plane, out) {
                 report.map =
                     Some(map::starts(&configuration, &configuration.measured(&from), &plane, folder)?);
@@ -520,6 +537,7 @@ fn filter(
         backup_plan,
         map: None,
         effort: None,
+        robustness: None,
     })
 }
 
@@ -758,6 +776,7 @@ fn filter_text(report: &FilterReport) -> String {
         lines.push(run.head());
     }
     lines.extend(report.backup_plan.iter().map(BackupPlanReport::text));
+    lines.extend(report.robustness.iter().map(RobustnessReport::text));
     if let Some(map) = &report.map {
         let files = map.files.join("\n         ");
         lines.push(format!("\n{} of {} starts can be promised\nwritten: {files}", map.promised, map.of));

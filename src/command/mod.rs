@@ -8,6 +8,7 @@ mod closed_loop;
 pub mod demo;
 pub mod inspect;
 mod map;
+mod robustness;
 pub mod merge;
 pub mod new;
 pub mod replay;
