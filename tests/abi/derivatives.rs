@@ -198,7 +198,7 @@ fn are_given_at_every_step() {
         (false, format!("{off}{point}{goal}{rock}")),
         (false, format!("{off}{bicycle}{goal}{rock}")),
         (false, format!("{free}{goal}{rock}")),
-        (false, format!("{unicycle}{errors}{goal}{rock}")),
+        (false, format!("{off}{unicycle}{errors}{goal}{rock}")),
         (true, format!("{off}{point}{earliest}{rated}")),
         (false, format!("{off}{unicycle}sampling = \"pointwise\"\n{goal}{rock}")),
         (true, format!("{unicycle}{goal}{rock}")),
