@@ -79,7 +79,8 @@ impl FilterConfiguration {
             return Err(ConfigurationError::new(*key, message));
         }
         // Rows alone refuse some of what was taken here.
-        let is_certain = self.is_assured() || built.is_ok() && mixed_degree.is_empty();
+        let is_same = mixed_degree.is_empty() && !self.leaves_errors_to_plans();
+        let is_certain = self.is_assured() || built.is_ok() && is_same;
         let filter = if is_certain { built } else { self.build() }?;
         if let (Backing::RowsOnly(reason), Some(_)) = (&self.findings.backing, &self.uncertainty) {
             let message = format!(
@@ -213,6 +214,10 @@ impl FilterConfiguration {
             .horizon(self.plan_horizon)
             .search_budget(self.search_budget.unwrap_or(Plans::SEARCH_BUDGET))
             .apart(self.apart());
+        let plans = match self.leaves_errors_to_plans() {
+            true => plans.measurement_errors(&self.errors()),
+            false => plans,
+        };
         match &self.uncertainty {
             Some(uncertainty) => uncertainty.declared(&self.plant, plans),
             None => plans,

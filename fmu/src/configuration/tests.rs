@@ -107,7 +107,7 @@ defects! {
         "measurement_errors = { v = 0.1 }\n[[barrier]]\nmethod = \"repeated_root\"",
         "goal.measurement_errors: needs a method that allows for errors, such as the reference profile";
     measurement_error_of_a_delayed_filter: FILTER,
-        "bounds =" => "actuation_delay = 0.001\nmeasurement_errors = { v = 0.1 }\nbounds =",
+        "bounds =" => "assurance = \"off\"\nactuation_delay = 0.001\nmeasurement_errors = { v = 0.1 }\nbounds =",
         "measurement_errors: needs an actuation_delay of 0, it is 0.001";
     negative_uncertain_rate: UNCERTAIN, "v = 0.1" => "v = -0.1",
         "uncertainty.rates.v: is -0.1, must be finite and >= 0";
@@ -127,17 +127,22 @@ defects! {
         "uncertainty.inputs.a.gain: is [1.1, 0.9], must be [least, largest] with least <= largest (in an FMU: \
          uncertainty.gain_min.a, uncertainty.gain_max.a)";
     gain_with_one_end: UNCERTAIN, "[0.9, 1.0]" => "[0.9]", "uncertainty.inputs.a.gain: has 1 entry, must have 2 (line 5)";
-    uncertain_lag: UNCERTAIN, "gain = [0.9, 1.0]" => "lag = [0.0, 0.1]",
-        "uncertainty.inputs.a.lag: is an unknown key; the keys are gain (line 5)";
+    lag_before_its_time: UNCERTAIN, "gain = [0.9, 1.0]" => "lag = [-0.1, 0.1]",
+        "uncertainty.inputs.a.lag[1]: is -0.1, must be finite and >= 0";
+    lag_from_more_to_less: UNCERTAIN, "gain = [0.9, 1.0]" => "lag = [0.1, 0.0]",
+        "uncertainty.inputs.a.lag: is [0.1, 0], must be [least, largest] with least <= largest (in an FMU: \
+         uncertainty.lag_min.a, uncertainty.lag_max.a)";
+    uncertain_delay: UNCERTAIN, "gain = [0.9, 1.0]" => "delay = 0.1",
+        "uncertainty.inputs.a.delay: is an unknown key; the keys are gain, lag (line 5)";
     uncertain_parameters: UNCERTAIN, "rates = { v = 0.1 }" => "parameters = { mass = [1.0, 2.0] }",
         "uncertainty.parameters: is an unknown key (did you mean rates?) (line 5)";
     uncertainty_without_plans: UNCERTAIN, "uncertainty =" => "assurance = \"off\"\nuncertainty =",
         "uncertainty: only plans account for it, and none are followed: assurance is \"off\". Change that, or leave `[uncertainty]` out";
     uncertainty_without_bounds: UNCERTAIN, ", omega = [-2.0, 2.0]" => "",
         "uncertainty: only plans account for it, and none are followed: omega has no bounds. Change that, or leave `[uncertainty]` out";
-    uncertainty_beside_a_delay: UNCERTAIN, "uncertainty =" => "actuation_delay = 0.001\nuncertainty =",
-        "uncertainty: only plans account for it, and none are followed: actuation_delay is 0.001, must be 0 for a plan. Change that, \
-         or leave `[uncertainty]` out";
+    uncertainty_beside_a_delay: UNCERTAIN, "uncertainty =" => "actuation_delay = 0.002\nuncertainty =",
+        "uncertainty: only plans account for it, and none are followed: actuation_delay is 0.002, must be <= period = 0.001 for a \
+         plan. Change that, or leave `[uncertainty]` out";
     uncertainty_beside_a_disturbance: UNCERTAIN, "radius = 2.0" => "radius = 2.0\ndisturbance = 0.2",
         "uncertainty: only plans account for it, and none are followed: goal.disturbance is 0.2, must be 0 for a plan; plans account \
          for `rates` of [uncertainty] in its place. Change that, or leave `[uncertainty]` out";

@@ -18,8 +18,12 @@ use crate::text::{number, quantity};
 const RATE: Range = Range::NON_NEGATIVE;
 /// The part of an input that arrives.
 const GAIN: Range = Range::POSITIVE;
+/// The time constant with which an input is followed.
+const LAG: Range = Range::NON_NEGATIVE;
 /// All of it.
 const ALL: [f64; 2] = [1.0, 1.0];
+/// At once.
+const AT_ONCE: [f64; 2] = [0.0, 0.0];
 
 /// `[uncertainty]`: the promises hold for every plant within it.
 /// docs/configuration.md has ranges and defaults.
@@ -41,6 +45,9 @@ pub struct UncertainInput {
     /// The least and the largest part of the input that arrives.
     #[serde(default = "all")]
     pub gain: [f64; 2],
+    /// The least and the largest time constant in s with which what arrives follows what is asked.
+    #[serde(default)]
+    pub lag: [f64; 2],
 }
 
 fn all() -> [f64; 2] {
@@ -73,12 +80,20 @@ pub(super) static SECTION: Section = Section {
 pub(super) static INPUT: Section = Section {
     name: "uncertain_input",
     keys: || {
-        static KEYS: [Key; 1] = [Key::new(
-            "gain",
-            Pair(Is("1"), GAIN),
-            Some("`[1, 1]`: all of it"),
-            "`[least, largest]` part of the input that arrives, constant or not; least ≤ largest",
-        )];
+        static KEYS: [Key; 2] = [
+            Key::new(
+                "gain",
+                Pair(Is("1"), GAIN),
+                Some("`[1, 1]`: all of it"),
+                "`[least, largest]` part of the input that arrives, constant or not; least ≤ largest",
+            ),
+            Key::new(
+                "lag",
+                Pair(Is("s"), LAG),
+                Some("`[0, 0]`: at once"),
+                "`[least, largest]` time constant with which what arrives follows what is asked, as a motor does; least ≤ largest",
+            ),
+        ];
         KEYS.iter().collect()
     },
 };
@@ -90,17 +105,22 @@ impl UncertaintySection {
         check_known("uncertainty.inputs", &self.inputs, "input", &plant.inputs())
     }
 
-    /// Refuses a least part that exceeds the largest one.
-    pub(super) fn check_gains(&self) -> Result<(), ConfigurationError> {
-        let Some((name, input)) = self.inputs.iter().find(|(_, input)| input.gain[0] > input.gain[1]) else {
-            return Ok(());
-        };
-        let [least, largest] = input.gain.map(number);
-        let message = format!(
-            "is [{least}, {largest}], must be [least, largest] with least <= largest (in an FMU: uncertainty.gain_min.{name}, \
-             uncertainty.gain_max.{name})"
-        );
-        Err(ConfigurationError::new(format!("uncertainty.inputs.{name}.gain"), message))
+    /// Refuses an interval that is from more to less.
+    pub(super) fn check_intervals(&self) -> Result<(), ConfigurationError> {
+        let intervals = self.inputs.iter().flat_map(|(name, input)| {
+            [("gain", input.gain), ("lag", input.lag)].map(|(key, interval)| (name, key, interval))
+        });
+        match intervals.into_iter().find(|(.., [least, largest])| least > largest) {
+            None => Ok(()),
+            Some((name, key, interval)) => {
+                let [least, largest] = interval.map(number);
+                let message = format!(
+                    "is [{least}, {largest}], must be [least, largest] with least <= largest (in an FMU: \
+                     uncertainty.{key}_min.{name}, uncertainty.{key}_max.{name})"
+                );
+                Err(ConfigurationError::new(format!("uncertainty.inputs.{name}.{key}"), message))
+            }
+        }
     }
 
     /// `plans` for every plant within it.
@@ -114,6 +134,11 @@ impl UncertaintySection {
         }
         if gains.iter().any(|gain| *gain != ALL) {
             plans = plans.uncertain_gains(&gains);
+        }
+        let lag = |name: &str| self.inputs.get(name).map_or(AT_ONCE, |input| input.lag);
+        let lags: Vec<[f64; 2]> = plant.inputs().iter().map(|input| lag(&input.name)).collect();
+        if lags.iter().any(|lag| *lag != AT_ONCE) {
+            plans = plans.uncertain_lags(&lags);
         }
         plans
     }
@@ -141,6 +166,14 @@ impl UncertaintySection {
                 rows.push(Parameter::new(names, "1", GAIN, description, move |c: &mut Declared| {
                     c.uncertainty.as_mut()?.inputs.get_mut(&name).map(|input| &mut input.gain[side])
                 }));
+                let name = input.name.clone();
+                let path = format!("uncertainty.inputs.{name}.lag[{}]", side + 1);
+                let description =
+                    format!("{of} time constant with which the {} is followed", input.description);
+                let names = (format!("uncertainty.{}.{name}", word.replace("gain", "lag")), path);
+                rows.push(Parameter::new(names, "s", LAG, description, move |c: &mut Declared| {
+                    c.uncertainty.as_mut()?.inputs.get_mut(&name).map(|input| &mut input.lag[side])
+                }));
             }
         }
         rows
@@ -163,10 +196,10 @@ impl FilterConfiguration {
         errors.into_iter().chain(uncertainty).collect::<Vec<_>>().join(" and ")
     }
 
-    /// For which plants plans keep the promises: rates, measurement errors and gains, in words. Empty if for the model alone.
+    /// For which plants plans keep the promises: rates, measurement errors, gains, lags and a delay, in words. Empty if for the model alone.
     pub fn covered(&self) -> Vec<String> {
         let none = UncertaintySection::default();
-        let declared = self.uncertainty.as_ref().unwrap_or(&none);
+        let declared = self.uncertainty.as_deref().unwrap_or(&none);
         let sizes = |sizes: &BTreeMap<String, f64>, degree: usize| {
             let given = self.plant.states().into_iter().filter_map(|state| {
                 let size = sizes.get(&state.name).filter(|size| **size > 0.0)?;
@@ -184,6 +217,12 @@ impl FilterConfiguration {
             ("measurement errors", sizes(&self.measurement_errors, 0)),
         ];
         let rates = rates.into_iter().filter(|(_, sizes)| !sizes.is_empty());
-        rates.map(|(what, sizes)| format!("{what} {sizes}")).chain(gains).collect()
+        let lags = self.plant.inputs().into_iter().filter_map(|input| {
+            let [least, largest] = declared.inputs.get(&input.name)?.lag;
+            let late = format!("lag of {} {} to {} s", input.name, number(least), number(largest));
+            (largest > 0.0).then_some(late)
+        });
+        let delay = (self.actuation_delay > 0.0).then(|| format!("delay {} s", number(self.actuation_delay)));
+        rates.map(|(what, sizes)| format!("{what} {sizes}")).chain(gains).chain(lags).chain(delay).collect()
     }
 }
