@@ -166,7 +166,7 @@ impl FilterConfiguration {
     /// For which plants plans keep the promises: rates, measurement errors and gains, in words. Empty if for the model alone.
     pub fn covered(&self) -> Vec<String> {
         let none = UncertaintySection::default();
-        let declared = self.uncertainty.as_ref().unwrap_or(&none);
+        let declared = self.uncertainty.as_deref().unwrap_or(&none);
         let sizes = |sizes: &BTreeMap<String, f64>, degree: usize| {
             let given = self.plant.states().into_iter().filter_map(|state| {
                 let size = sizes.get(&state.name).filter(|size| **size > 0.0)?;
