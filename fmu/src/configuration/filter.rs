@@ -147,7 +147,7 @@ pub struct FilterConfiguration {
     pub measurement_errors: BTreeMap<String, f64>,
     /// How the plant may differ from the model. The promises then hold for every such plant.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub uncertainty: Option<UncertaintySection>,
+    pub uncertainty: Option<Box<UncertaintySection>>,
     /// The run that it is meant for.
     pub experiment: ExperimentSection,
     /// What a run of this file alone has besides. It is no part of the FMU.
@@ -385,7 +385,7 @@ impl FilterConfiguration {
             policy: raw.policy,
             bounds: raw.bounds,
             measurement_errors: raw.measurement_errors,
-            uncertainty: raw.uncertainty,
+            uncertainty: raw.uncertainty.map(Box::new),
             experiment: raw.experiment,
             run: Box::new(RunSection {
                 x0: raw.x0,
