@@ -4,6 +4,8 @@
 //! corners, or chosen against the law of the plan at hand. Every promise is judged between samples too. More cases:
 //! `PUNCTUAL_ROBUST=100 cargo test --release -p punctual-core --test robust -- --nocapture`.
 
+#![allow(clippy::print_stdout, reason = "the figures are wanted")]
+
 use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::*;
@@ -244,7 +246,7 @@ struct Run {
     worse: f64,
 }
 
-fn run<P>(plant: P, case: &Case, declared: &Declared, how: &Run) -> Outcome
+fn run<P>(plant: &P, case: &Case, declared: &Declared, how: &Run) -> Outcome
 where
     P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
 {
@@ -258,7 +260,7 @@ where
         sides = match how.adversary {
             Adversary::Random => Sides::of(|| draws.within(-1.0, 1.0)),
             Adversary::Corners if draws.part() < 0.05 => Sides::of(|| draws.sign()),
-            Adversary::Worst => Sides::worst(&filter, &plant, case, t).unwrap_or(sides),
+            Adversary::Worst => Sides::worst(&filter, plant, case, t).unwrap_or(sides),
             _ => sides,
         };
         let measured: [f64; 4] = core::array::from_fn(|i| x[i] + how.worse * errors[i] * sides.errors[i]);
@@ -346,7 +348,7 @@ struct Tally {
 }
 
 /// Cases drawn from `seed` on, each run once against another adversary and another u_ref.
-fn tally<P>(name: &str, plant: P, bounds: [f64; 2], declare: impl Fn(bool) -> Declared, seed: u64) -> Tally
+fn tally<P>(name: &str, plant: &P, bounds: [f64; 2], declare: impl Fn(bool) -> Declared, seed: u64) -> Tally
 where
     P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
 {
@@ -368,7 +370,7 @@ where
             time: DEADLINE + 2.0,
             worse: 1.0,
         };
-        let outcome = run(plant.clone(), &case, &declared, &how);
+        let outcome = run(plant, &case, &declared, &how);
         if !outcome.accepted {
             println!("{name} {k}: {}", outcome.failure);
             continue;
@@ -394,36 +396,36 @@ fn is_kept(tally: &Tally) {
 
 #[test]
 fn point_masses_keep_what_was_promised() {
-    is_kept(&tally("point mass", PointMass, [4.0, 4.0], Declared::all, 1));
+    is_kept(&tally("point mass", &PointMass, [4.0, 4.0], Declared::all, 1));
 }
 
 #[test]
 fn unicycles_keep_what_was_promised() {
-    is_kept(&tally("unicycle", Unicycle, [4.0, 1.5], Declared::all, 2));
+    is_kept(&tally("unicycle", &Unicycle, [4.0, 1.5], Declared::all, 2));
 }
 
 #[test]
 fn bicycles_keep_what_was_promised() {
-    is_kept(&tally("bicycle", Bicycle::new(2.5).unwrap(), [4.0, 0.6], Declared::all, 3));
+    is_kept(&tally("bicycle", &Bicycle::new(2.5).unwrap(), [4.0, 0.6], Declared::all, 3));
 }
 
 /// A master that exchanges all values first delays every input by a step.
 #[test]
 fn a_delay_of_a_step_is_accounted_for() {
     let delay = |declared: Declared| Declared { delay: PERIOD, ..declared };
-    is_kept(&tally("unicycle", Unicycle, [4.0, 1.5], |is_point| delay(Declared::all(is_point)), 4));
+    is_kept(&tally("unicycle", &Unicycle, [4.0, 1.5], |is_point| delay(Declared::all(is_point)), 4));
     let exact = |_| Declared { delay: PERIOD, ..Declared::nothing() };
-    is_kept(&tally("bicycle", Bicycle::new(2.5).unwrap(), [4.0, 0.6], exact, 5));
+    is_kept(&tally("bicycle", &Bicycle::new(2.5).unwrap(), [4.0, 0.6], exact, 5));
 }
 
 /// A motor follows late, and by how much is not known.
 #[test]
 fn a_lag_is_accounted_for() {
     let late = |longest: f64| move |_| Declared { lags: [[0.0, longest]; 2], ..Declared::nothing() };
-    is_kept(&tally("point mass", PointMass, [4.0, 4.0], late(0.1), 6));
-    is_kept(&tally("unicycle", Unicycle, [4.0, 1.5], late(0.05), 7));
-    let all = |is_point| Declared { lags: [[0.0, 0.02]; 2], ..Declared::all(is_point) };
-    is_kept(&tally("unicycle", Unicycle, [4.0, 1.5], all, 8));
+    is_kept(&tally("point mass", &PointMass, [4.0, 4.0], late(0.1), 6));
+    is_kept(&tally("unicycle", &Unicycle, [4.0, 1.5], late(0.05), 7));
+    let all = |is_point| Declared { lags: [[0.0, 0.01]; 2], ..Declared::all(is_point) };
+    is_kept(&tally("unicycle", &Unicycle, [4.0, 1.5], all, 8));
 }
 
 /// A plant far beyond what was declared is seldom where the law can have led it: the flag falls, and says why.
@@ -434,7 +436,7 @@ fn a_plant_beyond_what_was_declared_loses_the_promise() {
     let mut lost = 0;
     for seed in 0..6 {
         let how = Run { adversary: Adversary::Corners, asks: Asks::Zero, seed, time: 4.0, worse: 8.0 };
-        let outcome = run(Unicycle, &case, &declared, &how);
+        let outcome = run(&Unicycle, &case, &declared, &how);
         assert!(outcome.accepted, "{outcome:?}");
         lost += u32::from(outcome.withdrawn > 0 && outcome.failure.contains("declared uncertainty"));
     }
@@ -448,7 +450,7 @@ fn what_cannot_be_kept_is_refused() {
     let case = Case::draw(&mut draws, [4.0, 4.0], true);
     let declared = Declared { rates: [0.0, 0.0, 4.0, 4.0], ..Declared::all(true) };
     let how = Run { adversary: Adversary::Random, asks: Asks::Zero, seed: 1, time: 1.0, worse: 1.0 };
-    let outcome = run(PointMass, &case, &declared, &how);
+    let outcome = run(&PointMass, &case, &declared, &how);
     assert!(!outcome.accepted && outcome.failure.contains("uncertain"), "{outcome:?}");
 }
 
@@ -503,6 +505,48 @@ fn samples_at_other_times_have_a_plan_of_their_own() {
             }
         }
         assert!(assured > 100, "{k}: {assured}");
+    }
+}
+
+/// If samples follow sooner than inputs act, two of them are on their way, and no prediction knows which: nothing is promised.
+#[test]
+fn samples_within_a_delay_promise_nothing() {
+    let mut draws = Draws(9);
+    let declared = Declared { delay: PERIOD, ..Declared::nothing() };
+    let case = Case::draw(&mut draws, [4.0, 4.0], true);
+    let (mut filter, mut x, mut u) = (case.filter(PointMass, Some(&declared)), case.x, [0.0; 2]);
+    for step in 0..40_u32 {
+        let report = filter.step(f64::from(step) * 0.5 * PERIOD, &x, &[4.0, 0.0], &mut u).unwrap();
+        let assurance = report.assurance.unwrap();
+        // The first does not know yet.
+        assert_eq!(assurance.is_assured(), step == 0, "{step}: {assurance:?}");
+        x = [x[0] + 0.5 * PERIOD * x[2], x[1] + 0.5 * PERIOD * x[3], x[2], x[3]];
+    }
+    let mut filter = case.filter(PointMass, Some(&declared));
+    filter.expect_hold(Some(0.5 * PERIOD)).unwrap();
+    let assurance = filter.step(0.0, &case.x, &[0.0; 2], &mut u).unwrap().assurance.unwrap();
+    let why = assurance.failure.expect("a refusal").to_string();
+    assert!(!assurance.is_assured() && why.contains("actuation_delay"), "{why}");
+}
+
+/// Armed again, a filter does not follow a law that was checked for what was promised before.
+#[test]
+fn armed_again_it_promises_what_a_new_plan_keeps() {
+    let declared = Declared { delay: 0.0, ..Declared::all(true) };
+    let case = Case { x: [0.0; 4], goal: [12.0, 0.0], rocks: Vec::new(), bounds: [4.0; 2], is_point: true };
+    let (mut filter, mut x, mut u) = (case.filter(PointMass, Some(&declared)), case.x, [0.0; 2]);
+    for step in 0..100_u32 {
+        let t = f64::from(step) * PERIOD;
+        if step == 50 {
+            filter.rearm();
+        }
+        let report = filter.step(t, &x, &[4.0, 0.0], &mut u).unwrap();
+        assert!(report.assurance.unwrap().is_assured(), "{step}: {:?}", report.assurance);
+        if step == 50 {
+            // Eight seconds from here, and not from the start.
+            assert!((filter.plan().unwrap().until - (t + DEADLINE + 3.0)).abs() < 2.0 * PERIOD);
+        }
+        x = [x[0] + PERIOD * x[2], x[1] + PERIOD * x[3], x[2] + PERIOD * u[0], x[3] + PERIOD * u[1]];
     }
 }
 
@@ -561,7 +605,7 @@ fn what_a_plan_is_said_to_bear_is_borne() {
     for (k, declared) in kinds.into_iter().enumerate() {
         let how =
             Run { adversary: ADVERSARIES[k % 4], asks: Asks::Hostile, seed: k as u64, time: 4.0, worse: 1.0 };
-        let outcome = run(Unicycle, &case, &declared, &how);
+        let outcome = run(&Unicycle, &case, &declared, &how);
         assert!(
             outcome.accepted && outcome.withdrawn == 0 && outcome.least >= 0.0,
             "{declared:?}: {outcome:?}"

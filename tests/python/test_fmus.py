@@ -119,7 +119,7 @@ def test_the_command_line_is_there(tmp_path):
 
 
 DECLARED = {
-    "actuation_delay": {"actuation_delay": STEP},
+    "actuation_delay": {"actuation_delay": 2 * STEP},
     "disturbance": {"barrier": [barrier | {"disturbance": 0.01} for barrier in ASSURED["barrier"]]},
 }
 

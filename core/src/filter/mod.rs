@@ -360,7 +360,10 @@ impl Filter {
         let state = &mut self.rows.state;
         state.barriers.fill(FixedTimeState::default());
         (state.time, state.period, state.curvatures) = (None, None, [None; 2]);
-        state.input.fill(0.0);
+        // Behind a delay it still acts.
+        if self.rows.delay == 0.0 {
+            state.input.fill(0.0);
+        }
         #[cfg(feature = "plan")]
         if let Some(backup) = &mut self.backup {
             state.plan.rearm();

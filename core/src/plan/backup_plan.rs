@@ -31,6 +31,11 @@ pub struct BackupPlan {
 }
 
 impl BackupPlan {
+    /// Forgets the law: it no longer holds that the plant is near the plan.
+    pub(crate) fn forget(&mut self) {
+        self.tracking = None;
+    }
+
     /// The largest rate of state `i` along the plan.
     pub(crate) fn largest_rate(&self, i: usize) -> f64 {
         self.rates[i]

@@ -67,6 +67,8 @@ pub enum Failure {
         #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
         beyond: f64,
     },
+    /// The next sample comes before the input of this one acts, so that two inputs are on their way.
+    Overtaken,
     /// A requirement began while no plan was followed, so it is not known whether it was met.
     Missed {
         /// The number of its barrier.
@@ -170,6 +172,9 @@ impl fmt::Display for Named<'_> {
                 "{} is {} farther from the plan than the declared uncertainty allows",
                 names.state(state),
                 names.state_amount(state, beyond)
+            ),
+            Failure::Overtaken => f.write_str(
+                "the next sample comes before the input of this one acts: steps must be at least as long as actuation_delay",
             ),
             Failure::NoRest => f.write_str("the plant does not reach an equilibrium, or a set moves"),
             Failure::Unsteady => f.write_str(

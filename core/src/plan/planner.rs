@@ -593,7 +593,7 @@ impl<'a> Planner<'a> {
             Walk::new(self.model(self.pace()), self.tolerances, self.requirements, 1.0, grid, (t, x))?;
         if let Some(uncertain) = self.uncertain {
             let measured = Uncertain { measured: None, ..uncertain };
-            walk = walk.within(self.measured(measured)?)?;
+            walk = walk.within(self.measured(measured)?.0)?;
             return walk.hold_in_tube(u, None, t + self.period);
         }
         walk.hold_until(u, t + self.period)

@@ -205,7 +205,7 @@ pub(super) static SECTION: Section = Section {
                 Some("`auto`"),
                 "`on`: the filter promises only what a plan within the bounds keeps, whatever u_ref is, and follows it where it \
                  must ([guarantees](guarantees.md#will-it-always)). The plan is sought at the first step; if none is found, \
-                 nothing is promised. Needs a model to run ahead, sets that stay where they are, no delay. `off`: the rows \
+                 nothing is promised. Needs a model to run ahead, sets that stay where they are, a delay of at most a step. `off`: the rows \
                  alone. `auto`: `on` where that is possible and every input has bounds, else `off`. Where every input has bounds, a \
                  warning names the keys that switch it off for all barriers",
             ),
@@ -254,7 +254,7 @@ pub(super) static SECTION: Section = Section {
                 Some("none"),
                 "largest error of a measured state, by name: the promise then holds for the true state. Plans account for it \
                  ([below](#uncertainty)), and so do the rows, to first order ([theory](theory.md#measurement-errors)). Needs the \
-                 reference profile, prediction over the period, no delay",
+                 reference profile, prediction over the period; beside a delay plans alone account for it",
             ),
             Key::new(
                 "uncertainty",
@@ -558,6 +558,7 @@ impl FilterConfiguration {
     pub(super) fn built(&self, mut mixed_degree: MixedDegree<'_>) -> Result<Filter, ConfigurationError> {
         let inputs = self.plant.inputs();
         let states = self.plant.states().len();
+        let is_for_plans = !matches!(mixed_degree, MixedDegree::Refused);
         let mut next_point = states;
         let plant = Forms::default();
         let mut builder = Filter::from_sources(states, inputs.len()).measured(self.barrier_inputs().len());
@@ -603,12 +604,12 @@ impl FilterConfiguration {
             min.push(if low <= -UNBOUNDED { f64::NEG_INFINITY } else { low });
             max.push(if high >= UNBOUNDED { f64::INFINITY } else { high });
         }
-        let mut errors = vec![0.0; states + self.barrier_inputs().len()];
-        for (error, state) in errors.iter_mut().zip(self.plant.states()) {
-            *error = self.measurement_errors.get(&state.name).copied().unwrap_or(0.0);
-        }
+        let errors = match is_for_plans && self.leaves_errors_to_plans() {
+            true => vec![0.0; states + self.barrier_inputs().len()],
+            false => self.errors(),
+        };
         if let Some(uncertainty) = &self.uncertainty {
-            uncertainty.check_gains()?;
+            uncertainty.check_intervals()?;
         }
         // The settings of the whole filter.
         builder
@@ -621,6 +622,18 @@ impl FilterConfiguration {
             .and_then(|b| b.measurement_errors(&errors))
             .and_then(FilterBuilder::build)
             .map_err(|e| ConfigurationError::new(e.field(), e.message()))
+    }
+
+    /// The largest error of each measured quantity.
+    pub(super) fn errors(&self) -> Vec<f64> {
+        let of = |name: &str| self.measurement_errors.get(name).copied().unwrap_or(0.0);
+        let states = self.plant.states().into_iter().map(|state| of(&state.name));
+        states.chain(self.barrier_inputs().iter().map(|_| 0.0)).collect()
+    }
+
+    /// Whether plans alone account for errors of measurement: rows do not beside a delay.
+    pub(super) fn leaves_errors_to_plans(&self) -> bool {
+        self.actuation_delay > 0.0 && !self.measurement_errors.is_empty()
     }
 
     /// The same filter, armed at its first step.

@@ -202,11 +202,11 @@ impl Filter {
     /// errors](crate::filter::FilterBuilder::measurement_errors) declared, every plant within them keeps the promise. It then
     /// has an [end](Assurance::until), which is postponed again and again. If the plant
     /// was seen to differ from the model, and 1.5 times that difference could take it out of a set before the next sample,
-    /// the guarantee is lost for that sample. A sample may be repeated at the same time, come early, or come late by a
+    /// the guarantee is lost for that sample. A sample may be repeated at the same time (not behind a delay), come early, or come late by a
     /// twentieth of a hold. If the time to the next sample changes and is [known](Self::expect_hold), a plan is sought for
     /// the new one; if none is found, the guarantee is lost. A sample that comes later suspends it until the next one. While
     /// x is not finite, the plan continues as it is. A barrier without a deadline that [begins later](Begin::At) is promised
-    /// from then on. A filter with a bound on the disturbance of a barrier, a delay, or a deadline for a barrier that begins
+    /// from then on. A filter with a bound on the disturbance of a barrier, a delay above the period, or a deadline for a barrier that begins
     /// later cannot be assured yet, and is refused. Sets must not move, unless [it is
     /// known](crate::barrier::Barrier::range_from) how low h gets: at an equilibrium each set is checked at eight later
     /// times, up to a day, and no plan is found if it has moved. With a [horizon](Plans::horizon) they may move, and the
@@ -237,7 +237,7 @@ impl Filter {
     /// A number of `plans` out of range; a filter that already has plans. A filter that cannot be assured: a barrier without
     /// a model that can be run ahead, or with another plant than the first one; one with a deadline that begins later, one
     /// that begins on another's arrival, or without a horizon one that moves for ever; a bound on the disturbance of a barrier;
-    /// a delay; an integrator, measured quantities beside the states, or a source without derivatives on enclosures for an
+    /// a delay above the period; an integrator, measured quantities beside the states, or a source without derivatives on enclosures for an
     /// uncertain plant. [`Self::obstacles`] lists them all.
     pub fn with_plans(mut self, plans: impl Into<Plans>) -> Result<Self, Error> {
         let plans = plans.into();
@@ -268,9 +268,10 @@ impl Filter {
             let message = format!("is {}, must be <= period = {} for a plan", rows.delay, plans.period);
             found.push(refused("actuation_delay", message));
         }
-        let is_uncertain = !rows.errors.is_exact()
-            || !(plans.errors.is_empty() && plans.rates.is_empty())
-            || !(plans.gains.is_empty() && plans.lags.is_empty());
+        let is_declared =
+            [plans.errors.is_empty(), plans.rates.is_empty(), plans.gains.is_empty(), plans.lags.is_empty()]
+                .contains(&false);
+        let is_uncertain = is_declared || !rows.errors.is_exact();
         if is_uncertain && self.integrator.is_some() {
             let message = "stands before an uncertain plant, for which no plan accounts yet";
             found.push(refused("integrator", message.into()));
@@ -279,6 +280,7 @@ impl Filter {
             let message = "follow the states of an uncertain plant, for which no plan accounts yet";
             found.push(refused("measured", message.into()));
         }
+        let is_erring = !rows.errors.is_exact() || plans.errors.iter().any(|error| *error > 0.0);
         for slot in &rows.slots {
             let mut refuse =
                 |field: &str, message: String| found.push(refused(field, message).within(&slot.name));
@@ -295,6 +297,9 @@ impl Filter {
                 (Begin::AfterArrival(_), _) => {
                     refuse("begin", "is the arrival of another barrier, which no plan can predict".into());
                 }
+            }
+            if is_erring && slot.end == End::OnArrival {
+                refuse("end", "is on arrival, which a measurement with errors does not tell".into());
             }
             if slot.source.predict().is_none() {
                 refuse("source", "has no model to run ahead".into());

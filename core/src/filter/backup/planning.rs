@@ -46,7 +46,11 @@ impl<'a> Planning<'a> {
     /// Whether a sample at `t` comes in time. A measured clock may be late, unless a tube says where the plant is until then.
     pub(super) fn in_time(&self, t: f64, hold: f64) -> bool {
         let jitter = if self.uncertainty.is_some() { TOLERANCES.on_time } else { DECISIONS.jitter };
-        self.before().in_time(t, hold, jitter)
+        // Behind a delay two inputs must not be on their way at once.
+        let (delay, slack) = (self.rows.delay, TOLERANCES.on_time * hold);
+        let last = self.before().last_time().unwrap_or(f64::NEG_INFINITY);
+        let follows = delay == 0.0 || t - last >= delay - slack && hold >= delay - slack;
+        follows && self.before().in_time(t, hold, jitter)
     }
 
     /// The model's state for the measured `x`.
@@ -61,7 +65,8 @@ impl<'a> Planning<'a> {
         if delay > 0.0
             && let Some(plant) = self.models().next()
         {
-            plant.flow(&mut x, &self.rows.acting()[..self.rows.input_dim], delay);
+            let (dims, u) = ([self.rows.state_dim, self.rows.input_dim], self.rows.acting());
+            Planner::new(plant, dims, self.bounds, &[], delay, 1.0).run(&mut x, &u[..dims[1]]);
         }
         (t + delay, x)
     }
@@ -71,12 +76,19 @@ impl<'a> Planning<'a> {
     pub(super) fn arriving(&self, t: f64) -> Vec<[f64; 2]> {
         let Some(of) = self.uncertainty.filter(|of| of.lags()) else { return Vec::new() };
         let (PlanState { arrived, sample, .. }, asked) = (self.before(), self.rows.acting());
-        let since = sample.map_or(0.0, |[last, _]| (t - last).max(0.0));
+        // What arrived is known from sample to sample, and before the first input. Otherwise it is within its bounds.
+        let is_first = self.rows.state.time.is_none()
+            && asked == core::array::from_fn(|i| self.rows.bounds.clamp(i, 0.0));
+        let since = match sample {
+            Some([last, _]) if !arrived.is_empty() => Some((t - last).max(0.0)),
+            _ => (arrived.is_empty() && is_first).then_some(0.0),
+        };
         let arrives = |i: usize| {
-            let asked = asked[i];
-            let [low, high] = arrived.get(i).copied().unwrap_or([asked; 2]);
+            let (asked, Some(since)) = (asked[i], since) else {
+                return [self.bounds.min[i], self.bounds.max[i]];
+            };
+            let [low, high] = arrived.get(i).copied().unwrap_or([asked; 2]).map(|arrived| arrived - asked);
             let [least, largest] = of.remains(i, since);
-            let [low, high] = [low - asked, high - asked];
             [asked + (low * least).min(low * largest), asked + (high * least).max(high * largest)]
         };
         (0..self.rows.input_dim).map(arrives).collect()

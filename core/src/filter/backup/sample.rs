@@ -112,6 +112,10 @@ impl Decision<'_> {
         {
             self.end(AssuranceStatus::Lost, Some(failure));
         }
+        // After anything else than a law or a plan from here, the plant need not be in a tube.
+        if self.uncertainty.is_some() && self.now().status != AssuranceStatus::Assured {
+            self.next().plan.backup_plan.forget();
+        }
         let PlanState { status, failure, plan, .. } = &self.rows.workspace.next.plan;
         let is_assured = *status == AssuranceStatus::Assured;
         (self.assurance.status, self.assurance.failure) = (*status, *failure);
@@ -145,6 +149,9 @@ impl Decision<'_> {
             };
             let later = least_factor(planning.longest(Plans::LONGEST, yields), None, later, sooner);
             found = later.map_or(found, Ok);
+        }
+        if hold < planning.rows.delay * (1.0 - TOLERANCES.on_time) {
+            found = Err(Failure::Overtaken);
         }
         // Until its first input acts, a filter can only look on.
         found = found.and_then(|(factor, first)| {

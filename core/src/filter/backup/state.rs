@@ -100,6 +100,11 @@ impl PlanState {
         self.sample.map(|[_, hold]| hold)
     }
 
+    /// When the input of the last sample began to act, in s.
+    pub(super) fn last_time(&self) -> Option<f64> {
+        self.sample.map(|[t, _]| t)
+    }
+
     /// As [`Filter::usual_hold`](crate::filter::Filter::usual_hold), for plans of this `period`.
     pub(super) fn usual_hold(&self, t: f64, period: f64) -> f64 {
         let PlanState { status, sample, alike, interval, .. } = *self;

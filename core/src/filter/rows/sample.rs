@@ -365,6 +365,7 @@ impl Rows {
         }
         for (i, ui) in u.iter_mut().enumerate() {
             *ui = self.bounds.clamp(i, 0.0);
+            next.input[i] = *ui;
         }
     }
 

@@ -3,6 +3,7 @@
 //! A search first leaves a part of every bound to the feedback. The tube around its plan says how much the feedback needs, and
 //! how much h loses; the next search leaves that. A few rounds settle, since the tube hardly depends on the plan.
 
+use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -34,6 +35,8 @@ pub(crate) struct Uncertain<'a> {
 const FIRST_RESERVE: f64 = 0.2;
 /// The largest part that a search leaves.
 const MOST_RESERVE: f64 = 0.7;
+/// The largest number of holds of a law: with more samples it holds its input over several.
+const MOST_HOLDS: usize = 800;
 /// Rounds of search and tube.
 const ROUNDS: u32 = 8;
 /// Factor on what the last round lacked.
@@ -161,28 +164,31 @@ impl<'a> Planner<'a> {
         t: f64,
         x: &[f64],
         records: bool,
-    ) -> Result<Result<BackupPlan, Lacks>, Failure> {
+    ) -> Result<Result<BackupPlan, Box<Lacks>>, Failure> {
         let [_, nu] = self.dims;
         let until = match plan.is_finite() {
             true => plan.backup_plan.until,
             false => (self.last(t) + uncertain.horizon).max(self.before.map_or(t, |before| before.until)),
         };
-        let holds = ((until - t) / self.period * (1.0 - 1e-9)) as usize + 1;
-        if holds > self.settings.most_samples {
+        // A plan that ends in motion is known until then only.
+        let part = if plan.is_finite() { 1.0 - 1e-9 } else { 1.0 };
+        let samples = ((until - t) / self.period * part) as usize + 1;
+        if samples > self.settings.most_samples {
             return Err(Failure::TooLong);
         }
-        let times: Vec<f64> = (0..=holds).map(|k| t + k as f64 * self.period).collect();
+        // Between frequent samples the law holds its input.
+        let stride = samples.div_ceil(MOST_HOLDS);
+        let later = (0..=(samples - 1).div_ceil(stride)).map(|k| 1 + k * stride);
+        let times: Vec<f64> = [0].into_iter().chain(later).map(|k| t + k as f64 * self.period).collect();
+        let holds = times.len() - 1;
         let model = self.model(self.period);
         let (mut z, mut u) = (x.to_vec(), vec![0.0; nu]);
         let (mut states, mut inputs) = (vec![z.clone()], Vec::with_capacity(holds));
-        let mut planned = plan.backup_plan.inputs.iter().peekable();
+        let end = plan.backup_plan.inputs.last().map_or(t, |(end, _)| *end);
         for hold in times.windows(2) {
-            let middle = 0.5 * (hold[0] + hold[1]);
-            while planned.next_if(|(end, _)| *end < middle).is_some() {}
-            match (planned.peek(), &plan.stopping) {
-                (Some((_, planned)), _) => u.copy_from_slice(&planned[..nu]),
-                (None, Some(stopping)) => stopping.input(&model, &z, &mut u),
-                (None, None) => {}
+            match &plan.stopping {
+                Some(stopping) if 0.5 * (hold[0] + hold[1]) > end => stopping.input(&model, &z, &mut u),
+                _ => u.copy_from_slice(&plan.backup_plan.mean(hold[0], hold[1])[..nu]),
             }
             model.flow(&mut z, &u, hold[1] - hold[0]);
             inputs.push(u.clone());
@@ -200,7 +206,7 @@ impl<'a> Planner<'a> {
             gains[0].clear();
             let reference =
                 Tracking { times: times.clone(), inputs: inputs.clone(), gains, ..Tracking::default() };
-            match self.checked(uncertain, plan, reference, x, records) {
+            match self.checked(uncertain, plan, reference, (until, x), records) {
                 Ok(Ok(backup_plan)) => return Ok(Ok(backup_plan)),
                 Ok(Err(lacks)) => {
                     let parts = lacks.missing.iter().zip(&lacks.falls).map(|(missing, fall)| missing / fall);
@@ -219,7 +225,8 @@ impl<'a> Planner<'a> {
         least.map(|(_, lacks)| Err(lacks)).ok_or(failure)
     }
 
-    /// The backup plan that follows `law`, whose reference begins at `x`, if every requirement is met in the tube around it.
+    /// The backup plan that follows `law` until `until`, if every requirement is met in the tube around its reference, which
+    /// begins at `x`.
     ///
     /// # Errors
     ///
@@ -229,13 +236,14 @@ impl<'a> Planner<'a> {
         uncertain: Uncertain<'_>,
         plan: &Plan,
         law: Tracking,
-        x: &[f64],
+        (until, x): (f64, &[f64]),
         records: bool,
-    ) -> Result<Result<BackupPlan, Lacks>, Failure> {
+    ) -> Result<Result<BackupPlan, Box<Lacks>>, Failure> {
         let Tracking { times, inputs, gains, .. } = law;
         let model = self.model(self.period);
-        let mut tube = self.measured(uncertain)?;
+        let (mut tube, begin) = self.measured(uncertain)?;
         tube.records = records;
+        let x = begin.as_deref().unwrap_or(x);
         let grid = Grid { period: self.period, even: true };
         let mut walk = Walk::new(model, self.tolerances, self.requirements, 1.0, grid, (times[0], x))?
             .after(&plan.backup_plan)
@@ -248,31 +256,39 @@ impl<'a> Planner<'a> {
             walk.hold_in_tube(&inputs[k], gain, times[k + 1])?;
         }
         let (backup_plan, tube) = walk.finish();
-        let lacks = tube.map(|tube| tube.lacks).unwrap_or_default();
+        let lacks = tube.map(|tube| Box::new(tube.lacks)).unwrap_or_default();
         if lacks.failure.is_some() {
             return Ok(Err(lacks));
         }
         let tracking = Tracking { times, inputs, states, gains, radii };
-        Ok(Ok(BackupPlan { tracking: Some(Arc::new(tracking)), ..backup_plan }))
+        Ok(Ok(BackupPlan {
+            until: until.min(backup_plan.until),
+            tracking: Some(Arc::new(tracking)),
+            ..backup_plan
+        }))
     }
 
-    /// The tube in which the plant is when the input of a sample begins to act.
+    /// The tube in which the plant is when the input of a sample begins to act; if that is later, the reference there too.
     ///
     /// # Errors
     ///
     /// There is none.
-    pub(super) fn measured<'b>(&'b self, uncertain: Uncertain<'b>) -> Result<Tube<'b>, Failure> {
+    pub(super) fn measured<'b>(
+        &'b self,
+        uncertain: Uncertain<'b>,
+    ) -> Result<(Tube<'b>, Option<Vec<f64>>), Failure> {
         let Uncertain { of, bounds, delay, measured, acting, arrived, .. } = uncertain;
         let arrives = |i: usize| arrived.get(i).copied().unwrap_or([acting[i]; 2]);
         let arrives: Vec<[f64; 2]> = (0..self.dims[1]).map(arrives).collect();
         let tube = Tube::around(self.plant, (of, delay), bounds, self.dims, self.requirements)
             .ok_or(Failure::Spreads)?
             .acted_on(&arrives);
-        let Some((t, x)) = measured else { return Ok(tube) };
+        let Some((t, x)) = measured else { return Ok((tube, None)) };
         let grid = Grid { period: delay, even: true };
         let mut walk = Walk::new(self.model(delay), self.tolerances, &[], 1.0, grid, (t, x))?.within(tube)?;
         walk.hold_in_tube(&acting[..self.dims[1]], None, t + delay)?;
-        walk.finish().1.map(|tube| *tube).ok_or(Failure::Spreads)
+        let begin = walk.state().to_vec();
+        walk.finish().1.map(|tube| (*tube, Some(begin))).ok_or(Failure::Spreads)
     }
 
     /// Whether the plant is at `x` at `t` where the law of `plan` is known to keep it.
@@ -292,14 +308,16 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// The remainder of `plan` from `x` at `t` by its law, if it has one: at one of its samples by the feedback, within a hold
+    /// The remainder of `plan` from `x` at `t` by its law, for an uncertain plant: at one of its samples by the feedback, within a hold
     /// by the input that is held.
     ///
     /// # Errors
     ///
-    /// The plan has ended; the plant is not where it was declared to be; or the next sample comes after the end of the hold.
+    /// There is no law; the plan has ended; the plant is not where it was declared to be; or the next sample comes after the
+    /// end of the hold.
     pub(super) fn followed(&self, plan: &Plan, t: f64, x: &[f64]) -> Option<Result<BackupPlan, Failure>> {
-        let (uncertain, tracking) = (self.uncertain?, plan.backup_plan.tracking.as_ref()?);
+        let uncertain = self.uncertain?;
+        let Some(tracking) = plan.backup_plan.tracking.as_ref() else { return Some(Err(Failure::NoRest)) };
         Some(self.is_declared(plan, t, x).and_then(|()| {
             let slack = self.tolerances.on_time * self.period;
             let mut inputs = plan.backup_plan.inputs.clone();

@@ -12,7 +12,7 @@
 //! deviation of z from that middle,
 //!
 //! ```math
-//! q_{ii} = d_i e_i + \tfrac{1}{2} e_i^2, \qquad q_{ij} = d_i e_j + d_j e_i + e_i e_j. \tag{2}
+//! q_{ii} = d_i e_i + \frac{1}{2} e_i^2, \qquad q_{ij} = d_i e_j + d_j e_i + e_i e_j. \tag{2}
 //! ```
 //!
 //! The deviations are enclosed by a zonotope. Each pair (i, j) contributes a generator along the vector H_ij, so that what a
@@ -60,9 +60,10 @@ pub use tracking::Tracking;
 pub(super) use tracking::gains;
 use zonotope::Zonotope;
 
-/// Largest number of generators. With 40 a unicycle's tube is a half wider than with 160, with 320 a tenth narrower
-/// (docs/theory.md#robust-plan).
+/// Largest number of generators. With fewer a tube is wider, since boxes are; with more a check takes longer.
 const GENERATORS: usize = 100;
+/// The same if inputs are followed late: what is late depends on the states, which a box forgets.
+const LATE_GENERATORS: usize = 200;
 /// Number of guesses of the deviations on a piece. The second is enough where a piece is short against the plant's motion.
 const GUESSES: u32 = 8;
 /// Part by which a guess exceeds what followed from the one before.
@@ -265,16 +266,22 @@ impl<'a> Tube<'a> {
         self.next_unseen.copy_from_slice(&self.of.errors);
         self.set.reach(&mut self.reach);
         let sizes: Vec<f64> = self.reach[..kept].iter().map(|reach| reach.max(LEAST)).collect();
-        self.set.reduce(GENERATORS, kept, &sizes, &mut self.rooms.scores);
+        // What arrives does not jump, what is asked does, and a share of the law follows from the states. So a box around some
+        // generators has to keep these and what is late from now on.
+        let share = |i: usize, e: &[f64]| gain.map_or(0.0, |gain| zonotope::dot(&gain[i * n..][..n], e));
         self.set.map(|column| {
             let (e, others) = column.split_at_mut(n);
             let (late, asked) = others.split_at_mut(kept - n);
-            for (i, asked) in asked.iter_mut().enumerate() {
-                let share = gain.map_or(0.0, |gain| zonotope::dot(&gain[i * n..][..n], e));
-                if let Some(late) = late.get_mut(i) {
-                    *late -= share - *asked;
-                }
-                *asked = share;
+            for (i, (late, asked)) in late.iter_mut().zip(asked).enumerate() {
+                *late += *asked - share(i, e);
+            }
+        });
+        let generators = if self.late > 0 { LATE_GENERATORS } else { GENERATORS };
+        self.set.reduce(generators, kept, &sizes, &mut self.rooms.scores);
+        self.set.map(|column| {
+            let (e, others) = column.split_at_mut(n);
+            for (i, asked) in others[kept - n..].iter_mut().enumerate() {
+                *asked = share(i, e);
             }
         });
         if self.late > 0 {
@@ -306,7 +313,7 @@ impl<'a> Tube<'a> {
             self.lacks.feedback[i] = self.lacks.feedback[i].max(share);
             let over = (v + share - self.bounds.max[i]).max(self.bounds.min[i] - v + share);
             // NaN is not within bounds.
-            if !(over <= 0.0) {
+            if over > 0.0 || over.is_nan() {
                 self.lacks.reserve[i] = self.lacks.reserve[i].max(over);
                 self.lack(Failure::NoReserve { input: i, missing: over })?;
             }
@@ -455,8 +462,10 @@ impl<'a> Tube<'a> {
         let first = times(&besides);
         let second = times(&first);
         let power = |k: i32| elementary::powi(kappa, k);
-        let beyond =
-            elementary::exp(kappa) * (power(5) / 120.0 + power(4) / 120.0 + power(3) / 24.0) + ROUND_OFF;
+        // What is late counts half as much again in its middle as in the bound on the deviations.
+        let more = if *late > 0 { 1.5 } else { 1.0 };
+        let beyond = more * elementary::exp(kappa) * (power(5) / 120.0 + power(4) / 120.0 + power(3) / 24.0)
+            + ROUND_OFF;
         let side = |i: usize| {
             let wide: f64 = (0..n + m).map(|j| radius(slope(i, j)) * most[j]).sum();
             let bent: f64 = (plant.pairs.iter().zip(curvatures.chunks_exact(n)))
@@ -516,15 +525,21 @@ impl<'a> Tube<'a> {
         }
         reach[..n].copy_from_slice(&most[..n]);
         if self.delay > 0.0 {
-            self.predict(model, piece, &most);
+            self.predict(model, piece, &most, residual);
         }
         all_finite(&sides) && all_finite(&self.set.centre)
     }
 
     /// Bounds how far the state predicted over the delay may be from the true one, on `piece`, on which deviations are up to
     /// `most`: ε′ ≥ ε + d (|M| ε′ + w + |N| (γ − 1) u) wherever the two are.
-    fn predict(&mut self, model: &dyn Predict, piece: Piece<'_>, most: &[f64]) {
-        let [n, m] = self.dims;
+    fn predict(
+        &mut self,
+        model: &dyn Predict,
+        piece: Piece<'_>,
+        most: &[f64],
+        residual: impl Fn(usize) -> f64,
+    ) {
+        let ([n, m], kept) = (self.dims, self.dims[0] + self.late);
         let Self { of, delay, next_unseen, plant, rooms, late, noise, reach, .. } = self;
         let Rooms { variables, rates, at: here, slopes, .. } = rooms;
         let evaluate = |variables: &[Second], out: &mut [Second]| {
@@ -535,12 +550,15 @@ impl<'a> Tube<'a> {
         let lost = |j: usize| {
             let [least, largest] = of.gains[j];
             let late = if *late > 0 { reach[n + j] } else { 0.0 };
-            2.0 * noise[j]
-                + late
-                + (1.0 - least).abs().max((largest - 1.0).abs()) * (piece.u[j].abs() + most[n + j])
+            let asked = reach[kept + j] + noise[j];
+            largest.max(1.0) * (2.0 * noise[j] + late)
+                + (1.0 - least).abs().max((largest - 1.0).abs()) * (piece.u[j].abs() + asked)
         };
+        // What earlier pieces of the hold left goes on, and the prediction itself is resolved as a reference is.
+        let begin: Vec<f64> =
+            next_unseen.iter().enumerate().map(|(i, unseen)| unseen + residual(i)).collect();
         let mut guess: Vec<f64> =
-            (0..n).map(|i| 2.0 * of.errors[i] + 2.0 * *delay * of.rates[i] + LEAST).collect();
+            (0..n).map(|i| 2.0 * begin[i] + 2.0 * *delay * of.rates[i] + LEAST).collect();
         for _ in 0..GUESSES {
             here.clear();
             here.extend((0..n + m).map(|i| match i < n {
@@ -559,7 +577,7 @@ impl<'a> Tube<'a> {
                     let slope = |j: usize| size(slopes[i * (n + m) + j]);
                     let moved: f64 = (0..n).map(|j| slope(j) * guess[j]).sum();
                     let driven: f64 = (0..m).map(|j| slope(n + j) * lost(j)).sum();
-                    (of.errors[i] + *delay * (moved + driven + of.rates[i])) * (1.0 + ROUND_OFF)
+                    (begin[i] + *delay * (moved + driven + of.rates[i])) * (1.0 + ROUND_OFF)
                 })
                 .collect();
             if wanted.iter().zip(&guess).all(|(wanted, guess)| wanted <= guess) {

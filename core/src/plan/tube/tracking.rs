@@ -104,7 +104,7 @@ impl Tracking {
             (x[i] - self.states[k][i]).abs() - self.radii[k][i] - round_off
         };
         // NaN has escaped.
-        (0..x.len()).map(|i| (i, beyond(i))).find(|(_, beyond)| !(*beyond <= 0.0))
+        (0..x.len()).map(|i| (i, beyond(i))).find(|(_, beyond)| *beyond > 0.0 || beyond.is_nan())
     }
 }
 
