@@ -428,6 +428,62 @@ fn a_lag_is_accounted_for() {
     is_kept(&tally("unicycle", &Unicycle, [4.0, 1.5], all, 8));
 }
 
+/// What is accepted and kept of 24 starts, by what is declared and used. Printed if `PUNCTUAL_TABLES` is set.
+#[test]
+fn table_of_what_is_declared() {
+    if std::env::var_os("PUNCTUAL_TABLES").is_none() {
+        return;
+    }
+    let none = Declared::nothing;
+    let lag = |longest: f64| Declared { lags: [[0.0, longest]; 2], ..none() };
+    let gain = |low: f64, high: f64| Declared { gains: [[low, high]; 2], ..none() };
+    let noise = |size: f64| {
+        move |is_point: bool| match is_point {
+            true => Declared { errors: [size; 4], ..Declared::nothing() },
+            false => Declared { errors: [size, size, 0.5 * size, size], ..Declared::nothing() },
+        }
+    };
+    let wind = |size: f64| {
+        move |is_point: bool| match is_point {
+            true => Declared { rates: [0.0, 0.0, size, size], ..Declared::nothing() },
+            false => Declared { rates: [0.0, 0.0, 0.0, size], ..Declared::nothing() },
+        }
+    };
+    type Row<'a> = (&'a str, Box<dyn Fn(bool) -> Declared>);
+    let rows: [Row<'_>; 11] = [
+        ("lag 0 to 20 ms", Box::new(move |_| lag(0.02))),
+        ("lag 0 to 50 ms", Box::new(move |_| lag(0.05))),
+        ("lag 0 to 100 ms", Box::new(move |_| lag(0.1))),
+        ("gain 0.9 to 1.1", Box::new(move |_| gain(0.9, 1.1))),
+        ("gain 0.9 to 1", Box::new(move |_| gain(0.9, 1.0))),
+        ("noise 2 cm", Box::new(noise(0.02))),
+        ("noise 5 cm", Box::new(noise(0.05))),
+        ("wind 0.1 m/s2", Box::new(wind(0.1))),
+        ("wind 0.3 m/s2", Box::new(wind(0.3))),
+        ("a step of delay", Box::new(move |_| Declared { delay: PERIOD, ..none() })),
+        (
+            "all of it, with the delay",
+            Box::new(|is_point| Declared { delay: PERIOD, ..Declared::all(is_point) }),
+        ),
+    ];
+    for (name, declare) in rows {
+        let (mut of, mut accepted, mut unkept) = (0, 0, 0);
+        for seed in [21, 22] {
+            for found in [
+                tally("point mass", &PointMass, [4.0, 4.0], &declare, seed),
+                tally("unicycle", &Unicycle, [4.0, 1.5], &declare, seed),
+                tally("bicycle", &Bicycle::new(2.5).unwrap(), [4.0, 0.6], &declare, seed),
+            ] {
+                of += found.nominal;
+                accepted += found.accepted;
+                unkept += found.broken + found.withdrawn;
+            }
+        }
+        println!("| {name} | {accepted} of {of} accepted | {unkept} broken or withdrawn |");
+        assert_eq!(unkept, 0, "{name}");
+    }
+}
+
 /// A plant far beyond what was declared is seldom where the law can have led it: the flag falls, and says why.
 #[test]
 fn a_plant_beyond_what_was_declared_loses_the_promise() {
