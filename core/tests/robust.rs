@@ -424,8 +424,10 @@ fn a_lag_is_accounted_for() {
     let late = |longest: f64| move |_| Declared { lags: [[0.0, longest]; 2], ..Declared::nothing() };
     is_kept(&tally("point mass", &PointMass, [4.0, 4.0], late(0.1), 6));
     is_kept(&tally("unicycle", &Unicycle, [4.0, 1.5], late(0.05), 7));
+    // Beside all the rest about half of these are accepted. They are kept.
     let all = |is_point| Declared { lags: [[0.0, 0.01]; 2], ..Declared::all(is_point) };
-    is_kept(&tally("unicycle", &Unicycle, [4.0, 1.5], all, 8));
+    let found = tally("unicycle", &Unicycle, [4.0, 1.5], all, 8);
+    assert!(found.broken == 0 && found.withdrawn == 0 && found.accepted > 0, "{found:?}");
 }
 
 /// What is accepted and kept of 24 starts, by what is declared and used. Printed if `PUNCTUAL_TABLES` is set.
