@@ -436,33 +436,35 @@ fn table_of_what_is_declared() {
     if std::env::var_os("PUNCTUAL_TABLES").is_none() {
         return;
     }
-    let none = Declared::nothing;
-    let lag = |longest: f64| Declared { lags: [[0.0, longest]; 2], ..none() };
-    let gain = |low: f64, high: f64| Declared { gains: [[low, high]; 2], ..none() };
+    let lag = |longest: f64| move |_: bool| Declared { lags: [[0.0, longest]; 2], ..Declared::nothing() };
+    let gain =
+        |low: f64, high: f64| move |_: bool| Declared { gains: [[low, high]; 2], ..Declared::nothing() };
     let noise = |size: f64| {
-        move |is_point: bool| match is_point {
-            true => Declared { errors: [size; 4], ..Declared::nothing() },
-            false => Declared { errors: [size, size, 0.5 * size, size], ..Declared::nothing() },
+        move |is_point: bool| {
+            let heading = if is_point { size } else { 0.5 * size };
+            Declared { errors: [size, size, heading, size], ..Declared::nothing() }
         }
     };
     let wind = |size: f64| {
-        move |is_point: bool| match is_point {
-            true => Declared { rates: [0.0, 0.0, size, size], ..Declared::nothing() },
-            false => Declared { rates: [0.0, 0.0, 0.0, size], ..Declared::nothing() },
+        move |is_point: bool| {
+            let aside = if is_point { size } else { 0.0 };
+            Declared { rates: [0.0, 0.0, aside, size], ..Declared::nothing() }
         }
     };
-    type Row<'a> = (&'a str, Box<dyn Fn(bool) -> Declared>);
-    let rows: [Row<'_>; 11] = [
-        ("lag 0 to 20 ms", Box::new(move |_| lag(0.02))),
-        ("lag 0 to 50 ms", Box::new(move |_| lag(0.05))),
-        ("lag 0 to 100 ms", Box::new(move |_| lag(0.1))),
-        ("gain 0.9 to 1.1", Box::new(move |_| gain(0.9, 1.1))),
-        ("gain 0.9 to 1", Box::new(move |_| gain(0.9, 1.0))),
+    let delay = |_: bool| Declared { delay: PERIOD, ..Declared::nothing() };
+    let all = |is_point: bool| Declared { delay: PERIOD, ..Declared::all(is_point) };
+    type Row = (&'static str, Box<dyn Fn(bool) -> Declared>);
+    let rows: [Row; 11] = [
+        ("lag 0 to 20 ms", Box::new(lag(0.02))),
+        ("lag 0 to 50 ms", Box::new(lag(0.05))),
+        ("lag 0 to 100 ms", Box::new(lag(0.1))),
+        ("gain 0.9 to 1.1", Box::new(gain(0.9, 1.1))),
+        ("gain 0.9 to 1", Box::new(gain(0.9, 1.0))),
         ("noise 2 cm", Box::new(noise(0.02))),
         ("noise 5 cm", Box::new(noise(0.05))),
         ("wind 0.1 m/s2", Box::new(wind(0.1))),
         ("wind 0.3 m/s2", Box::new(wind(0.3))),
-        ("a step of delay", Box::new(move |_| Declared { delay: PERIOD, ..none() })),
+        ("a step of delay", Box::new(delay)),
         (
             "all of it, with the delay",
             Box::new(|is_point| Declared { delay: PERIOD, ..Declared::all(is_point) }),
