@@ -465,10 +465,7 @@ fn table_of_what_is_declared() {
         ("wind 0.1 m/s2", Box::new(wind(0.1))),
         ("wind 0.3 m/s2", Box::new(wind(0.3))),
         ("a step of delay", Box::new(delay)),
-        (
-            "all of it, with the delay",
-            Box::new(|is_point| Declared { delay: PERIOD, ..Declared::all(is_point) }),
-        ),
+        ("all of it, with the delay", Box::new(all)),
     ];
     for (name, declare) in rows {
         let (mut of, mut accepted, mut unkept) = (0, 0, 0);

@@ -47,6 +47,7 @@ impl MeasurementErrors {
     }
 
     /// The largest error of each of the `states` states.
+    #[cfg(feature = "plan")]
     pub(crate) fn sizes(&self, states: usize) -> Vec<f64> {
         let mut sizes = alloc::vec![0.0; states];
         for direction in self.directions.chunks_exact(self.state_dim) {
