@@ -188,6 +188,8 @@ impl<'a> Planner<'a> {
         for hold in times.windows(2) {
             match &plan.stopping {
                 Some(stopping) if 0.5 * (hold[0] + hold[1]) > end => stopping.input(&model, &z, &mut u),
+                // To the last bit what is asked for now.
+                _ if inputs.is_empty() => u.copy_from_slice(&plan.backup_plan.inputs[0].1[..nu]),
                 _ => u.copy_from_slice(&plan.backup_plan.mean(hold[0], hold[1])[..nu]),
             }
             model.flow(&mut z, &u, hold[1] - hold[0]);

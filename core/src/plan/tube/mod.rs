@@ -400,7 +400,6 @@ impl<'a> Tube<'a> {
         for _ in 0..GUESSES {
             for i in 0..n + m {
                 let around = if i < n { over[i][0] } else { here[i] };
-                variables.clear();
                 here[i] = Interval::new(
                     around.value() - radius(around) - most[i],
                     around.value() + radius(around) + most[i],

@@ -57,8 +57,7 @@ impl Zonotope {
         }
     }
 
-    /// The largest value of −`direction`ᵀx and half the width of that of ±`direction`ᵀx around the centre: the former is
-    /// −`direction`ᵀc plus the latter.
+    /// How far `direction`ᵀx may be from its value at the centre.
     pub(super) fn half_width(&self, direction: &[f64]) -> f64 {
         self.columns().map(|column| dot(direction, column).abs()).sum()
     }
