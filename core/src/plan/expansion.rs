@@ -18,6 +18,11 @@ pub(super) fn slope(expansion: &Expansion, dt: f64) -> f64 {
     (1..EXPANSION_ORDERS).rev().fold(0.0, |sum, k| sum * dt + k as f64 * expansion[k])
 }
 
+/// The mean over the first `dt` s.
+pub(super) fn mean(expansion: &Expansion, dt: f64) -> f64 {
+    (0..EXPANSION_ORDERS).rev().fold(0.0, |sum, k| sum * dt + expansion[k] / (k + 1) as f64)
+}
+
 /// The same polynomial in the time since `dt` s after its start.
 pub(super) fn shifted(expansion: &Expansion, dt: f64) -> Expansion {
     let mut c = *expansion;

@@ -203,6 +203,7 @@ impl<'a> Walk<'a> {
         i: usize,
         (path, over): (&[Expansion], &[ExpansionOver]),
         (from, dt): (f64, f64),
+        turns: u32,
     ) -> [f64; 2] {
         let Some(tube) = &mut self.tube else {
             return [self.least(i, (path, over), (from, dt), self.tolerances.halvings), 0.0];
@@ -215,11 +216,22 @@ impl<'a> Walk<'a> {
         if lowest >= self.least_of(i) && lowest - self.margin(i) >= tightest {
             return [lowest, 0.0];
         }
-        let fall = self.tube.as_mut().map_or(0.0, |tube| tube.fall((i, requirement), time, over));
+        let fall = self.tube.as_mut().map(|tube| tube.fall((i, requirement), time, over));
+        let [fall, turned] = fall.unwrap_or_default();
         self.falls[i] = fall;
-        let least = self.least(i, (path, over), (from, dt), self.tolerances.halvings) - fall;
+        let least = (self.least(i, (path, over), (from, dt), self.tolerances.halvings) - fall).max(lowest);
+        let decides = least < self.least_of(i) || least - self.margin(i) < tightest;
         self.falls[i] = 0.0;
-        [least.max(lowest), fall]
+        if decides && turns > 0 && turned > self.tolerances.turned * fall {
+            let half = 0.5 * dt;
+            let later: Vec<Expansion> = path.iter().map(|c| shifted(c, half)).collect();
+            let halves = [(path, from), (&later, from + half)].map(|(path, from)| {
+                let over: Vec<ExpansionOver> = path.iter().map(|c| expansion::over(c, half)).collect();
+                self.least_in_tube(i, (path, &over), (from, half), turns - 1)
+            });
+            return if halves[0][0] < halves[1][0] { halves[0] } else { halves[1] };
+        }
+        [least, fall]
     }
 
     /// Takes over the rates of the previous plan.
@@ -409,7 +421,7 @@ impl<'a> Walk<'a> {
         }
         let mut in_force = (0..self.requirements.len()).filter(|i| self.requirements[*i].is_in_force(from));
         let met = in_force.try_for_each(|i| {
-            let [least, fall] = self.least_in_tube(i, (&path, &over), (from, dt));
+            let [least, fall] = self.least_in_tube(i, (&path, &over), (from, dt), self.tolerances.turns);
             self.note_in_tube(i, from, least, fall)
         });
         // After a failure nothing is followed further.

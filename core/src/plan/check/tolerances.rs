@@ -49,6 +49,9 @@ pub(crate) struct CheckTolerances {
     pub(crate) sharper: u32,
     /// Least bound of a piece that is sharp enough, as a part of the least value seen.
     pub(crate) sharp: f64,
+    /// The part that the turning of h on a piece may have in its fall in a tube, and the number of halvings that lessen it.
+    pub(crate) turned: f64,
+    pub(crate) turns: u32,
 
     // The perturbed plant.
     /// How many times a deviation may grow along a new plan, and along the remainder of one.
@@ -164,6 +167,9 @@ pub(crate) const TOLERANCES: CheckTolerances = CheckTolerances {
     // If three halvings do not bring the bound within a fifth of the values seen, it stays as it is.
     sharper: 3,
     sharp: 0.8,
+    // A bound on the fall is sound on any part, so that fewer halvings only refuse more. Three divide the turning by eight.
+    turned: 0.1,
+    turns: 3,
 
     // A deviation begins with `residual`, far more than round-off. Plans of the vehicles, the arm and the cart-pole stay at
     // or below 100 (docs/theory.md#backup-plan), and the limit for new plans leaves two orders above that. What was accepted

@@ -35,8 +35,12 @@ pub(crate) struct Uncertain<'a> {
 const FIRST_RESERVE: f64 = 0.2;
 /// The largest part that a search leaves.
 const MOST_RESERVE: f64 = 0.7;
-/// The largest number of holds of a law: with more samples it holds its input over several.
-const MOST_HOLDS: usize = 800;
+/// The numbers of holds of a law, if they were all as long as the longest one, that are tried in turn. A law holds its inputs
+/// longer and longer, since what is far ahead is planned anew before: with few holds a check is short, with many a law is
+/// quicker.
+const HOLDS: [usize; 2] = [250, 800];
+/// The least ratio of the number of samples of a hold to that of the one before, until it is the longest.
+const LONGER: f64 = 1.25;
 /// Rounds of search and tube.
 const ROUNDS: u32 = 8;
 /// Factor on what the last round lacked.
@@ -165,7 +169,6 @@ impl<'a> Planner<'a> {
         x: &[f64],
         records: bool,
     ) -> Result<Result<BackupPlan, Box<Lacks>>, Failure> {
-        let [_, nu] = self.dims;
         let until = match plan.is_finite() {
             true => plan.backup_plan.until,
             false => (self.last(t) + uncertain.horizon).max(self.before.map_or(t, |before| before.until)),
@@ -176,15 +179,58 @@ impl<'a> Planner<'a> {
         if samples > self.settings.most_samples {
             return Err(Failure::TooLong);
         }
-        // Between frequent samples the law holds its input.
-        let stride = samples.div_ceil(MOST_HOLDS);
-        let later = (0..=(samples - 1).div_ceil(stride)).map(|k| 1 + k * stride);
-        let times: Vec<f64> = [0].into_iter().chain(later).map(|k| t + k as f64 * self.period).collect();
-        let holds = times.len() - 1;
+        let before = plan.backup_plan.tracking.as_deref();
+        let longest = match before {
+            // As quick as the law that is kept.
+            Some(before) => vec![((before.longest_hold() / self.period + 0.5) as usize).max(1)],
+            None => HOLDS.iter().map(|holds| samples.div_ceil(*holds)).collect(),
+        };
+        let slack = self.tolerances.on_time * self.period;
+        let (mut least, mut failure) = (None, Failure::Spreads);
+        for longest in longest {
+            // What the quickest law lacks counts.
+            least = None;
+            let times: Vec<f64> =
+                begins(samples, longest).into_iter().map(|k| t + k as f64 * self.period).collect();
+            let (states, inputs) = self.reference(plan, &times, x);
+            let kept =
+                |k: usize| before.and_then(|before| before.gain_at(times[k], slack)).map(<[f64]>::to_vec);
+            let gains = match before {
+                Some(_) => (0..inputs.len()).map(kept).collect::<Option<Vec<_>>>().into_iter().collect(),
+                None => gains(self.plant, (&times, &states, &inputs), &self.reaches(uncertain)),
+            };
+            for mut gains in gains {
+                gains[0].clear();
+                let reference =
+                    Tracking { times: times.clone(), inputs: inputs.clone(), gains, ..Tracking::default() };
+                match self.checked(uncertain, plan, reference, (until, x), records) {
+                    Ok(Ok(backup_plan)) => return Ok(Ok(backup_plan)),
+                    Ok(Err(lacks)) => {
+                        let parts =
+                            lacks.missing.iter().zip(&lacks.falls).map(|(missing, fall)| missing / fall);
+                        let reaches = self.reaches(uncertain);
+                        let parts =
+                            parts.chain(lacks.reserve.iter().zip(reaches).map(|(over, reach)| over / reach));
+                        // Nothing is missing where nothing falls.
+                        let size: f64 = parts.filter(|part| !part.is_nan()).sum();
+                        if least.as_ref().is_none_or(|(before, _)| size < *before) {
+                            least = Some((size, lacks));
+                        }
+                    }
+                    Err(ends) => failure = ends,
+                }
+            }
+        }
+        least.map(|(_, lacks)| Err(lacks)).ok_or(failure)
+    }
+
+    /// The states at these `times`, and the inputs held between, of the nominal `plan` from `x`.
+    fn reference(&self, plan: &Plan, times: &[f64], x: &[f64]) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
+        let nu = self.dims[1];
         let model = self.model(self.period);
         let (mut z, mut u) = (x.to_vec(), vec![0.0; nu]);
-        let (mut states, mut inputs) = (vec![z.clone()], Vec::with_capacity(holds));
-        let end = plan.backup_plan.inputs.last().map_or(t, |(end, _)| *end);
+        let (mut states, mut inputs) = (vec![z.clone()], Vec::with_capacity(times.len() - 1));
+        let end = plan.backup_plan.inputs.last().map_or(times[0], |(end, _)| *end);
         for hold in times.windows(2) {
             match &plan.stopping {
                 Some(stopping) if 0.5 * (hold[0] + hold[1]) > end => stopping.input(&model, &z, &mut u),
@@ -196,35 +242,7 @@ impl<'a> Planner<'a> {
             inputs.push(u.clone());
             states.push(z.clone());
         }
-        let slack = self.tolerances.on_time * self.period;
-        let before = plan.backup_plan.tracking.as_deref();
-        let kept = |k: usize| before.and_then(|before| before.gain_at(times[k], slack)).map(<[f64]>::to_vec);
-        let gains = match before {
-            Some(_) => (0..holds).map(kept).collect::<Option<Vec<_>>>().into_iter().collect(),
-            None => gains(self.plant, (&times, &states, &inputs), &self.reaches(uncertain)),
-        };
-        let (mut least, mut failure) = (None, Failure::Spreads);
-        for mut gains in gains {
-            gains[0].clear();
-            let reference =
-                Tracking { times: times.clone(), inputs: inputs.clone(), gains, ..Tracking::default() };
-            match self.checked(uncertain, plan, reference, (until, x), records) {
-                Ok(Ok(backup_plan)) => return Ok(Ok(backup_plan)),
-                Ok(Err(lacks)) => {
-                    let parts = lacks.missing.iter().zip(&lacks.falls).map(|(missing, fall)| missing / fall);
-                    let parts = parts.chain(
-                        lacks.reserve.iter().zip(self.reaches(uncertain)).map(|(over, reach)| over / reach),
-                    );
-                    // Nothing is missing where nothing falls.
-                    let size: f64 = parts.filter(|part| !part.is_nan()).sum();
-                    if least.as_ref().is_none_or(|(before, _)| size < *before) {
-                        least = Some((size, lacks));
-                    }
-                }
-                Err(ends) => failure = ends,
-            }
-        }
-        least.map(|(_, lacks)| Err(lacks)).ok_or(failure)
+        (states, inputs)
     }
 
     /// The backup plan that follows `law` until `until`, if every requirement is met in the tube around its reference, which
@@ -342,6 +360,17 @@ impl<'a> Planner<'a> {
         let planner = Planner { bounds: uncertain.bounds, ..*self };
         (0..self.dims[1]).map(|i| planner.model(self.period).reach(i, self.size)).collect()
     }
+}
+
+/// The samples at which the holds of a law begin, of `samples` samples, and the end of the last: each up to `longest` samples
+/// long.
+fn begins(samples: usize, longest: usize) -> Vec<usize> {
+    let (mut begins, mut length) = (vec![0, 1], 1.0_f64);
+    while begins.last().is_some_and(|last| *last < samples) {
+        length = (length * LONGER).min(longest as f64);
+        begins.push(begins[begins.len() - 1] + length as usize);
+    }
+    begins
 }
 
 /// `bounds` without `reserve` at either side.

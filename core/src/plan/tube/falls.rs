@@ -9,25 +9,27 @@ use alloc::vec::Vec;
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
+use super::Tube;
 use super::bends::{radius, size};
-use super::{Tube, zonotope};
+use super::zonotope::{self, Zonotope};
 use crate::interval::Interval;
 use crate::lie::{ExpansionOver, Second};
 use crate::plan::Requirement;
 use crate::scalar::Scalar;
 
 impl Tube<'_> {
-    /// By how much h of `requirement`, number `i`, may be lower than along the reference at any time on the last piece, on
-    /// which the reference is within `over` for the enclosed `time` (s). Infinite if it is not known.
+    /// By how much h of `requirement`, number `i`, may be lower than along the reference at any enclosed `time` (s) on the last
+    /// piece, for which the reference is within `over`; and how much of that a shorter time may lessen. Infinite if it is not
+    /// known.
     pub(in crate::plan) fn fall(
         &mut self,
         (i, requirement): (usize, &Requirement<'_>),
         time: Interval,
         over: &[ExpansionOver],
-    ) -> f64 {
+    ) -> [f64; 2] {
         let n = self.dims[0];
-        let Self { set, reach, moved, barriers, rooms, .. } = self;
-        let Some(bends) = &barriers[i] else { return f64::INFINITY };
+        let Self { set, before, reach, bulge, barriers, rooms, .. } = self;
+        let Some(bends) = &barriers[i] else { return [f64::INFINITY, 0.0] };
         let evaluate = |x: &[Second], out: &mut [Second]| match requirement.model.second_value(time, x) {
             Some(h) => {
                 out[0] = h;
@@ -44,10 +46,17 @@ impl Tube<'_> {
         }
         bends.curvatures(&rooms.at, (&mut rooms.variables, &mut value), evaluate, &mut rooms.curvatures);
         let middle: Vec<f64> = rooms.slopes.iter().map(|slope| slope.value()).collect();
-        let centre = -zonotope::dot(&middle, &set.centre);
-        let boxed: f64 =
-            (0..n).map(|j| middle[j].abs() * moved[j] + radius(rooms.slopes[j]) * reach[j]).sum();
-        let linear = centre + set.half_width(&middle) + boxed;
+        // Any deviation is near a line between one at the beginning and one at the end.
+        let mut ends = |along: &[f64], of: &dyn Fn(f64, f64) -> f64| {
+            let mut end = |set: &Zonotope| {
+                of(zonotope::dot(along, &set.centre), set.half_width(along, &mut rooms.parts))
+            };
+            end(before).max(end(set))
+        };
+        let aside = |along: &[f64]| along.iter().zip(&*bulge).map(|(d, bulge)| d.abs() * bulge).sum::<f64>();
+        let turned: f64 = (0..n).map(|j| radius(rooms.slopes[j]) * reach[j]).sum();
+        let furthest = ends(&middle, &|centre, half| half - centre);
+        let linear = furthest + aside(&middle) + turned;
         // The curvature in the middle by its principal directions, its width by size.
         let count = bends.bent.len();
         let mut curvature = DMatrix::zeros(count, count);
@@ -61,13 +70,13 @@ impl Tube<'_> {
             wide += (radius(*along) + 1e-12 * size(*along)) * both;
         }
         if !(linear + wide).is_finite() || !curvature.iter().all(|v| v.is_finite()) {
-            return f64::INFINITY;
+            return [f64::INFINITY, 0.0];
         }
         let mut bent = 0.0;
         if count > 0 && curvature.iter().any(|v| *v != 0.0) {
             let scale = curvature.amax();
             let Some(principal) = SymmetricEigen::try_new(curvature, 1e-14, 100) else {
-                return f64::INFINITY;
+                return [f64::INFINITY, 0.0];
             };
             for (value, vector) in principal.eigenvalues.iter().zip(principal.eigenvectors.column_iter()) {
                 // Rounded towards less than it is.
@@ -77,14 +86,12 @@ impl Tube<'_> {
                     for (of, v) in bends.bent.iter().zip(vector.iter()) {
                         direction[*of] = *v;
                     }
-                    let boxed: f64 = direction.iter().zip(&*moved).map(|(d, moved)| d.abs() * moved).sum();
-                    let across =
-                        zonotope::dot(&direction, &set.centre).abs() + set.half_width(&direction) + boxed;
+                    let across = ends(&direction, &|centre, half| centre.abs() + half) + aside(&direction);
                     bent -= 0.5 * value * across * across;
                 }
             }
         }
-        (linear + wide + bent) * (1.0 + 1e-12) + f64::EPSILON
+        [(linear + wide + bent) * (1.0 + 1e-12) + f64::EPSILON, turned + wide]
     }
 
     /// Enclosures of where the plant is on the last piece, on which the reference is within `over`.
@@ -103,9 +110,10 @@ impl Tube<'_> {
     /// By how much h of `requirement`, number `i`, may be lower at the beginning than at the reference state `z` at `t`.
     pub(in crate::plan) fn fall_at(&mut self, at: (usize, &Requirement<'_>), t: f64, z: &[f64]) -> f64 {
         self.set.reach(&mut self.reach);
-        self.moved.fill(0.0);
+        self.before.clone_from(&self.set);
+        self.bulge.fill(0.0);
         let over: Vec<ExpansionOver> =
             z.iter().map(|z| [Interval::from(*z); crate::lie::EXPANSION_ORDERS]).collect();
-        self.fall(at, Interval::from(t), &over)
+        self.fall(at, Interval::from(t), &over)[0]
     }
 }

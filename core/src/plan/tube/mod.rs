@@ -47,7 +47,7 @@ mod tests;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::expansion::at;
+use super::expansion::{self, at};
 use super::{Failure, Requirement};
 use crate::MAX_INPUTS;
 use crate::elementary;
@@ -148,9 +148,13 @@ pub(super) struct Tube<'a> {
     /// The largest share of each input so far that answers an error of measurement, if inputs are followed late. What arrives
     /// of it then is a mean of earlier ones, and no larger.
     noise: Vec<f64>,
+    /// The same at the beginning of the last piece.
+    before: Zonotope,
     /// The largest deviation on the last piece, and how far one moves there.
     reach: Vec<f64>,
     moved: Vec<f64>,
+    /// How far a deviation may be on the last piece from the line between its beginning and its end.
+    bulge: Vec<f64>,
     /// Whether everything is recorded in `lacks` that is not met. Otherwise the first of it ends the check.
     pub(super) records: bool,
     pub(super) lacks: Lacks,
@@ -168,7 +172,7 @@ struct Rooms {
     slopes: Vec<Interval>,
     curvatures: Vec<Interval>,
     scores: Vec<(f64, usize)>,
-    moves: Vec<f64>,
+    parts: Vec<f64>,
 }
 
 /// A piece of the reference: the expansions of its states and their enclosures, its length in s, and the input held.
@@ -214,11 +218,13 @@ impl<'a> Tube<'a> {
             next_unseen: of.errors.clone(),
             dims,
             set: Zonotope::point(n + late + m),
+            before: Zonotope::point(n + late + m),
             late,
             last: vec![0.0; m],
             noise: vec![0.0; m],
             reach: vec![0.0; n + late + m],
             moved: vec![0.0; n],
+            bulge: vec![0.0; n],
             records: false,
             lacks: Lacks {
                 falls: vec![0.0; requirements.len()],
@@ -268,21 +274,26 @@ impl<'a> Tube<'a> {
         let sizes: Vec<f64> = self.reach[..kept].iter().map(|reach| reach.max(LEAST)).collect();
         // What arrives does not jump, what is asked does, and a share of the law follows from the states. So a box around some
         // generators has to keep these and what is late from now on.
-        let share = |i: usize, e: &[f64]| gain.map_or(0.0, |gain| zonotope::dot(&gain[i * n..][..n], e));
-        self.set.map(|column| {
-            let (e, others) = column.split_at_mut(n);
-            let (late, asked) = others.split_at_mut(kept - n);
-            for (i, (late, asked)) in late.iter_mut().zip(asked).enumerate() {
-                *late += *asked - share(i, e);
-            }
-        });
-        let generators = if self.late > 0 { LATE_GENERATORS } else { GENERATORS };
+        let share = |i: usize, j: usize| gain.map_or(0.0, |gain| gain[i * n + j]);
+        let late = self.late;
+        if late > 0 {
+            self.set.map(|i, j| match (i.checked_sub(n), i.checked_sub(kept)) {
+                (Some(input), None) if j < n => -share(input, j),
+                (Some(input), None) if j == kept + input => 1.0,
+                _ => f64::from(i == j),
+            });
+        }
+        let generators = if late > 0 { LATE_GENERATORS } else { GENERATORS };
         self.set.reduce(generators, kept, &sizes, &mut self.rooms.scores);
-        self.set.map(|column| {
-            let (e, others) = column.split_at_mut(n);
-            for (i, asked) in others[kept - n..].iter_mut().enumerate() {
-                *asked = share(i, e);
+        self.set.map(|i, j| match i.checked_sub(kept) {
+            Some(input) => {
+                if j < n {
+                    share(input, j)
+                } else {
+                    0.0
+                }
             }
+            None => f64::from(i == j),
         });
         if self.late > 0 {
             for (i, v) in v.iter().enumerate() {
@@ -346,8 +357,9 @@ impl<'a> Tube<'a> {
     ) -> bool {
         let Piece { path, over, dt, u } = piece;
         let ([n, m], kept) = (self.dims, self.dims[0] + self.late);
-        let Self { of, set, late, noise, reach, moved, plant, rooms, .. } = self;
-        let Rooms { variables, rates, at: here, slopes, curvatures, moves, .. } = rooms;
+        let Self { of, set, before, late, noise, reach, moved, bulge, plant, rooms, .. } = self;
+        let Rooms { variables, rates, at: here, slopes, curvatures, .. } = rooms;
+        before.clone_from(set);
         rates.resize(n, Second::from(0.0));
         let evaluate = |variables: &[Second], out: &mut [Second]| {
             let (x, u) = variables.split_at(n);
@@ -362,6 +374,16 @@ impl<'a> Tube<'a> {
         let away: Vec<f64> = (0..n + m)
             .map(|i| match over.get(i) {
                 Some(over) => (over[0].high - here[i].low).max(here[i].low - over[0].low),
+                None => 0.0,
+            })
+            .collect();
+        // In the mean it is nearer.
+        let in_the_mean: Vec<f64> = (0..n + m)
+            .map(|i| match path.get(i) {
+                Some(path) => {
+                    let far = (expansion::mean(path, dt) - here[i].value()).abs();
+                    far * (1.0 + ROUND_OFF) + ROUND_OFF * size(over[i][0])
+                }
                 None => 0.0,
             })
             .collect();
@@ -457,6 +479,10 @@ impl<'a> Tube<'a> {
                 dt * (others[i] + gains)
             })
             .collect();
+        // Constant inputs bend no line. A rate that is bounded takes one aside by half its length at most.
+        for ((bulge, bent), besides) in bulge.iter_mut().zip(times(moved)).zip(&besides) {
+            *bulge = (bent / 8.0 + besides / 2.0) * (1.0 + ROUND_OFF);
+        }
         let kappa = times(&most[..n]).iter().zip(&most).map(|(moved, most)| moved / most).fold(0.0, f64::max);
         let first = times(&besides);
         let second = times(&first);
@@ -486,28 +512,25 @@ impl<'a> Tube<'a> {
             bent + fixed
         };
         let shifts: Vec<f64> = (0..n).map(shift).collect();
-        moves.clear();
-        moves.resize(n, 0.0);
-        set.map(|column| {
-            let (e, others) = column.split_at_mut(n);
-            let (late, asked) = others.split_at_mut(kept - n);
-            for (i, moved) in moves.iter_mut().enumerate() {
-                let by = &driven[i * m..][..m];
-                *moved = zonotope::dot(&flow[i * n..][..n], e) + zonotope::dot(by, asked);
-                for ((by, late), arrives) in by.iter().zip(&*late).zip(&arrives) {
-                    *moved += by * arrives.mean * late;
-                }
-            }
-            e.copy_from_slice(moves);
-            for (i, late) in late.iter_mut().enumerate() {
-                *late *= middle(of.remains(i, dt)).0;
-            }
+        set.map(|i, j| match (i < n, j.checked_sub(n), j.checked_sub(kept)) {
+            (true, None, _) => flow[i * n + j],
+            (true, _, Some(input)) => driven[i * m + input],
+            (true, Some(input), None) => driven[i * m + input] * arrives[input].mean,
+            (false, Some(input), None) if i == j => middle(of.remains(input, dt)).0,
+            _ => f64::from(i == j),
         });
         for (i, row) in integral.chunks_exact(n).enumerate() {
             set.centre[i] += zonotope::dot(row, &shifts) * dt;
         }
         for (pair, along) in plant.pairs.iter().zip(curvatures.chunks_exact(n)) {
-            let [_, spread] = product(*pair, &away, &most);
+            // A deviation is its value in the middle of the piece, and half of how far it moves.
+            let changing = |of: usize| if of < n { 0.5 * moved[of] } else { most[of] };
+            let first = |a: usize, b: usize| in_the_mean[a] * most[b] + away[a] * changing(b);
+            let [a, b] = *pair;
+            let spread = match a == b {
+                true => first(a, a) + 0.25 * most[a] * most[a],
+                false => first(a, b) + first(b, a) + most[a] * most[b],
+            };
             set.push(along.iter().map(|along| along.value() * spread * dt));
         }
         for (j, Arrives { spread, .. }) in

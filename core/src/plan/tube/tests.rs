@@ -63,10 +63,13 @@ fn a_reduced_zonotope_encloses_what_it_was() {
         }
         let mut reduced = set.clone();
         reduced.reduce(20, 3, &[1.0, 0.5, 2.0], &mut Vec::new());
-        assert!(reduced.columns().len() <= 20);
+        assert!(reduced.len() <= 20);
         for _ in 0..200 {
             let direction: Vec<f64> = (0..3).map(|_| draws.signed()).collect();
-            assert!(reduced.half_width(&direction) >= set.half_width(&direction));
+            assert!(
+                reduced.half_width(&direction, &mut Vec::new())
+                    >= set.half_width(&direction, &mut Vec::new())
+            );
         }
         // No wider than the box around it.
         let (mut reach, mut before) = ([0.0; 3], [0.0; 3]);
@@ -191,7 +194,7 @@ where
         let dt = 0.02;
         over.extend(path.iter().map(|c| expansion::over(c, dt)));
         assert!(tube.advance(model, Piece { path: &path, over: &over, dt, u: &v }, |_| 1e-10));
-        let fall = tube.fall((0, &requirement), Interval::from(0.0), &over);
+        let [fall, _] = tube.fall((0, &requirement), Interval::from(0.0), &over);
         for step in 1..=2 {
             let at_end = step == 2;
             let reference: [f64; 4] = core::array::from_fn(|i| at(&path[i], dt / 2.0 * f64::from(step)));
@@ -204,7 +207,8 @@ where
                     let direction: Vec<f64> = (0..4).map(|_| draws.signed()).collect();
                     let (along, centre) =
                         (zonotope::dot(&direction, &e), zonotope::dot(&direction, &tube.set.centre));
-                    *left |= (along - centre).abs() > tube.set.half_width(&direction) + INTEGRATED;
+                    *left |= (along - centre).abs()
+                        > tube.set.half_width(&direction, &mut Vec::new()) + INTEGRATED;
                 }
             }
         }
@@ -301,7 +305,7 @@ fn no_disturbance_of_a_linear_cart_leads_out_of_its_tube() {
                 let response =
                     |(x, asked): &([f64; 3], f64)| d[0] * x[0] + d[1] * x[1] + d[2] * (x[2] - asked);
                 let farthest: f64 = responses.iter().map(|found| response(found).abs()).sum();
-                let half = tube.set.half_width(&d);
+                let half = tube.set.half_width(&d, &mut Vec::new());
                 assert!(farthest <= half * (1.0 + 1e-9), "{dt} {lag} {k} {d:?}: {farthest} {half}");
             }
         }

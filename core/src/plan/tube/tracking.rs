@@ -60,6 +60,11 @@ impl Tracking {
         (k < self.inputs.len() && (self.times[k] - t).abs() <= slack).then_some(k)
     }
 
+    /// The length in s of its longest hold.
+    pub(in crate::plan) fn longest_hold(&self) -> f64 {
+        self.times.windows(2).map(|hold| hold[1] - hold[0]).fold(0.0, f64::max)
+    }
+
     /// The gain of the hold that begins at `t`, or of the last one.
     pub(in crate::plan) fn gain_at(&self, t: f64, slack: f64) -> Option<&[f64]> {
         let k = self.times.partition_point(|time| *time < t - slack).min(self.gains.len().checked_sub(1)?);
