@@ -68,6 +68,8 @@ struct Declared {
     gains: [[f64; 2]; 2],
     lags: [[f64; 2]; 2],
     delay: f64,
+    /// By how much of a period samples come late, or soon.
+    jitter: f64,
 }
 
 impl Declared {
@@ -81,7 +83,14 @@ impl Declared {
     }
 
     fn nothing() -> Self {
-        Self { rates: [0.0; 4], errors: [0.0; 4], gains: [[1.0; 2]; 2], lags: [[0.0; 2]; 2], delay: 0.0 }
+        Self {
+            rates: [0.0; 4],
+            errors: [0.0; 4],
+            gains: [[1.0; 2]; 2],
+            lags: [[0.0; 2]; 2],
+            delay: 0.0,
+            jitter: 0.0,
+        }
     }
 }
 
@@ -128,13 +137,14 @@ impl Case {
         let low = self.bounds.map(|b| -b);
         builder = builder.bounds(&low, &self.bounds).unwrap().sampling(Sampling::Period(PERIOD)).unwrap();
         let mut plans = Plans::every(PERIOD);
-        if let Some(Declared { rates, errors, gains, lags, delay }) = declared {
+        if let Some(Declared { rates, errors, gains, lags, delay, jitter }) = declared {
             builder = builder.actuation_delay(*delay).unwrap();
             plans = plans
                 .uncertain_rates(rates)
                 .uncertain_gains(gains)
                 .uncertain_lags(lags)
-                .measurement_errors(errors);
+                .measurement_errors(errors)
+                .jitter(*jitter);
         }
         builder.build().unwrap().with_plans(plans).unwrap()
     }
@@ -250,13 +260,21 @@ fn run<P>(plant: &P, case: &Case, declared: &Declared, how: &Run) -> Outcome
 where
     P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
 {
-    let Declared { rates, errors, gains, lags, delay } = declared;
+    let Declared { rates, errors, gains, lags, delay, jitter } = declared;
     let (mut draws, mut filter) = (Draws(how.seed), case.filter(plant.clone(), Some(declared)));
     let (mut x, mut acting, mut late) = (case.x, [0.0; 2], [0.0; 2]);
     let mut sides = Sides::of(|| draws.sign());
     let mut outcome = Outcome { least: f64::INFINITY, ..Outcome::default() };
+    let mut next = 0.0;
     for step in 0..(how.time / PERIOD) as u32 {
-        let t = f64::from(step) * PERIOD;
+        let t = if *jitter > 0.0 { next } else { f64::from(step) * PERIOD };
+        if t > how.time {
+            break;
+        }
+        // Late by all that is declared, or any time.
+        let part = if draws.part() < 0.5 { 1.0 } else { draws.within(-1.0, 1.0) };
+        let period = if *jitter > 0.0 { PERIOD * (1.0 + how.worse * jitter * part) } else { PERIOD };
+        next = t + period;
         sides = match how.adversary {
             Adversary::Random => Sides::of(|| draws.within(-1.0, 1.0)),
             Adversary::Corners if draws.part() < 0.05 => Sides::of(|| draws.sign()),
@@ -301,7 +319,7 @@ where
             core::array::from_fn::<f64, 4, _>(|i| rate[i] + how.worse * rates[i] * sides.rates[i])
         };
         for part in 0..PARTS {
-            let h = PERIOD / f64::from(PARTS);
+            let h = period / f64::from(PARTS);
             let asked = if (f64::from(part) + 0.5) * h < *delay { &before } else { &u };
             let follow = |late: &mut [f64; 2]| {
                 for i in 0..2 {
@@ -352,6 +370,21 @@ fn tally<P>(name: &str, plant: &P, bounds: [f64; 2], declare: impl Fn(bool) -> D
 where
     P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
 {
+    tally_until(DEADLINE + 2.0, name, plant, bounds, declare, seed)
+}
+
+/// The same for `time` s.
+fn tally_until<P>(
+    time: f64,
+    name: &str,
+    plant: &P,
+    bounds: [f64; 2],
+    declare: impl Fn(bool) -> Declared,
+    seed: u64,
+) -> Tally
+where
+    P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
+{
     let cases = std::env::var("PUNCTUAL_ROBUST").map_or(4, |cases| cases.parse().unwrap());
     let is_point = name == "point mass";
     let (mut draws, declared) = (Draws(seed), declare(is_point));
@@ -367,7 +400,7 @@ where
             adversary: ADVERSARIES[(k + seed as usize) % 4],
             asks: ASKS[(k / 4 + k) % 3],
             seed: k as u64,
-            time: DEADLINE + 2.0,
+            time,
             worse: 1.0,
         };
         let outcome = run(plant, &case, &declared, &how);
@@ -430,6 +463,22 @@ fn a_lag_is_accounted_for() {
     assert!(found.broken == 0 && found.withdrawn == 0 && found.accepted > 0, "{found:?}");
 }
 
+/// A plan for an uncertain plant ends, and is prolonged again and again, where the vehicle rests too.
+#[test]
+fn promises_go_on() {
+    is_kept(&tally_until(20.0, "point mass", &PointMass, [4.0, 4.0], Declared::all, 1));
+    is_kept(&tally_until(20.0, "unicycle", &Unicycle, [4.0, 1.5], Declared::all, 2));
+}
+
+/// A loop that is sometimes slow: samples come up to 30 % late, or at any time before.
+#[test]
+fn samples_that_come_late_are_accounted_for() {
+    let late = |declared: Declared| Declared { jitter: 0.3, ..declared };
+    is_kept(&tally("unicycle", &Unicycle, [4.0, 1.5], |_| late(Declared::nothing()), 9));
+    is_kept(&tally("point mass", &PointMass, [4.0, 4.0], |is_point| late(Declared::all(is_point)), 10));
+    is_kept(&tally("bicycle", &Bicycle::new(2.5).unwrap(), [4.0, 0.6], |_| late(Declared::nothing()), 12));
+}
+
 /// What is accepted and kept of 24 starts, by what is declared and used. Printed if `PUNCTUAL_TABLES` is set.
 #[test]
 fn table_of_what_is_declared() {
@@ -452,9 +501,10 @@ fn table_of_what_is_declared() {
         }
     };
     let delay = |_: bool| Declared { delay: PERIOD, ..Declared::nothing() };
+    let jitter = |_: bool| Declared { jitter: 0.3, ..Declared::nothing() };
     let all = |is_point: bool| Declared { delay: PERIOD, ..Declared::all(is_point) };
     type Row = (&'static str, Box<dyn Fn(bool) -> Declared>);
-    let rows: [Row; 11] = [
+    let rows: [Row; 12] = [
         ("lag 0 to 20 ms", Box::new(lag(0.02))),
         ("lag 0 to 50 ms", Box::new(lag(0.05))),
         ("lag 0 to 100 ms", Box::new(lag(0.1))),
@@ -465,6 +515,7 @@ fn table_of_what_is_declared() {
         ("wind 0.1 m/s2", Box::new(wind(0.1))),
         ("wind 0.3 m/s2", Box::new(wind(0.3))),
         ("a step of delay", Box::new(delay)),
+        ("samples up to 30 % late", Box::new(jitter)),
         ("all of it, with the delay", Box::new(all)),
     ];
     for (name, declare) in rows {

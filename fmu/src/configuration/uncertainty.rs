@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::key::{
     Key, Section,
     Unit::{Is, Of},
-    Value::{NumberByName, Pair, TableByName},
+    Value::{Number, NumberByName, Pair, TableByName},
 };
 use super::names::check_known;
 use super::{ConfigurationError, FilterConfiguration, Parameter, PlantSection, Range, over_seconds};
@@ -20,6 +20,8 @@ const RATE: Range = Range::NON_NEGATIVE;
 const GAIN: Range = Range::POSITIVE;
 /// The time constant with which an input is followed.
 const LAG: Range = Range::NON_NEGATIVE;
+/// The part of a step by which a sample may be late.
+const JITTER: Range = Range::NON_NEGATIVE;
 /// All of it.
 const ALL: [f64; 2] = [1.0, 1.0];
 /// At once.
@@ -36,6 +38,15 @@ pub struct UncertaintySection {
     /// What arrives of an input, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub inputs: BTreeMap<String, UncertainInput>,
+    /// By how much of a step the next one may come late.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub jitter: f64,
+}
+
+/// Whether nothing is declared.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
 }
 
 /// An entry of `inputs` in `[uncertainty]`.
@@ -58,7 +69,7 @@ fn all() -> [f64; 2] {
 pub(super) static SECTION: Section = Section {
     name: "uncertainty",
     keys: || {
-        static KEYS: [Key; 2] = [
+        static KEYS: [Key; 3] = [
             Key::new(
                 "rates",
                 NumberByName(Of("unit of the state per s"), RATE),
@@ -70,6 +81,13 @@ pub(super) static SECTION: Section = Section {
                 TableByName(&INPUT),
                 Some("all of each arrives"),
                 "what arrives of an input, by name: the next table",
+            ),
+            Key::new(
+                "jitter",
+                Number(Is("1"), JITTER),
+                Some("0: at once"),
+                "the part of a step by which the next one may come late; it may also come at any time before. For loops with a \
+                 measured clock, and for masters with steps of several lengths",
             ),
         ];
         KEYS.iter().collect()
@@ -140,13 +158,20 @@ impl UncertaintySection {
         if lags.iter().any(|lag| *lag != AT_ONCE) {
             plans = plans.uncertain_lags(&lags);
         }
-        plans
+        plans.jitter(self.jitter)
     }
 
     /// Its numbers that are parameters of the FMU: those that the file states.
     pub(super) fn parameters(&self, plant: &PlantSection) -> Vec<Parameter<FilterConfiguration>> {
         type Declared = FilterConfiguration;
         let mut rows = Vec::new();
+        if self.jitter > 0.0 {
+            let names = ("uncertainty.jitter".to_string(), "uncertainty.jitter".to_string());
+            let description = "part of a step by which the next one may come late".to_string();
+            rows.push(Parameter::new(names, "1", JITTER, description, |c: &mut Declared| {
+                Some(&mut c.uncertainty.as_mut()?.jitter)
+            }));
+        }
         for state in plant.states().into_iter().filter(|state| self.rates.contains_key(&state.name)) {
             let name = state.name;
             let names = (format!("uncertainty.rate.{name}"), format!("uncertainty.rates.{name}"));
@@ -186,7 +211,10 @@ impl FilterConfiguration {
     /// have an end.
     pub(super) fn declares_uncertainty(&self) -> bool {
         !self.measurement_errors.is_empty()
-            || self.uncertainty.as_ref().is_some_and(|of| !of.rates.is_empty() || !of.inputs.is_empty())
+            || self
+                .uncertainty
+                .as_ref()
+                .is_some_and(|of| !of.rates.is_empty() || !of.inputs.is_empty() || of.jitter > 0.0)
     }
 
     /// The tables that declare this, in words.
@@ -196,7 +224,7 @@ impl FilterConfiguration {
         errors.into_iter().chain(uncertainty).collect::<Vec<_>>().join(" and ")
     }
 
-    /// For which plants plans keep the promises: rates, measurement errors, gains, lags and a delay, in words. Empty if for the model alone.
+    /// For which plants plans keep the promises: rates, measurement errors, gains, lags, a delay and late steps, in words. Empty if for the model alone.
     pub fn covered(&self) -> Vec<String> {
         let none = UncertaintySection::default();
         let declared = self.uncertainty.as_deref().unwrap_or(&none);
@@ -223,6 +251,9 @@ impl FilterConfiguration {
             (largest > 0.0).then_some(late)
         });
         let delay = (self.actuation_delay > 0.0).then(|| format!("delay {} s", number(self.actuation_delay)));
-        rates.map(|(what, sizes)| format!("{what} {sizes}")).chain(gains).chain(lags).chain(delay).collect()
+        let jitter = (declared.jitter > 0.0)
+            .then(|| format!("steps up to {} of a step late", number(declared.jitter)));
+        let rates = rates.map(|(what, sizes)| format!("{what} {sizes}"));
+        rates.chain(gains).chain(lags).chain(delay).chain(jitter).collect()
     }
 }

@@ -46,6 +46,7 @@ impl Planning<'_> {
             errors: vec![0.0; states],
             gains: vec![[1.0; 2]; inputs],
             lags: vec![[0.0; 2]; inputs],
+            jitter: 0.0,
         });
         let keeps = |uncertainty: &Uncertainty| {
             let planning = Planning { uncertainty: Some(uncertainty), ..own };

@@ -219,7 +219,7 @@ impl Planning<'_> {
             return Ok(chosen);
         }
         match planner.tail(plan, t, x) {
-            Ok(kept) => Ok(choice.beside_plan(kept, memory)),
+            Ok(kept) => Ok(choice.beside_plan(planner.prolonged(plan, kept, t, x), memory)),
             // The plant is off the plan: anything else that keeps the promise is used.
             Err(failure) => choice.any_other().ok_or(failure),
         }

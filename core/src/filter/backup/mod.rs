@@ -63,6 +63,8 @@ pub struct Plans {
     lags: Vec<[f64; 2]>,
     /// How far each state may be from its measured value; empty if the rows know.
     errors: Vec<f64>,
+    /// By how much of a period a sample may come late; 0 if samples come as expected.
+    jitter: f64,
 }
 
 impl From<f64> for Plans {
@@ -89,6 +91,7 @@ impl Plans {
             gains: Vec::new(),
             lags: Vec::new(),
             errors: Vec::new(),
+            jitter: 0.0,
         }
     }
 
@@ -147,6 +150,13 @@ impl Plans {
         Self { errors: errors.to_vec(), ..self }
     }
 
+    /// Declares that samples come at any time up to `part` of a period, finite, ≥ 0, later than the period after the last one:
+    /// a clock that is measured, or a loop that is sometimes slow. Default 0: every period.
+    #[must_use]
+    pub fn jitter(self, part: f64) -> Self {
+        Self { jitter: part, ..self }
+    }
+
     /// Declares that the sets of each pair of barriers, given by their numbers, have no state in common at any time.
     /// Promises that need both at once are then refused without a search ([`Failure::Apart`](crate::plan::Failure::Apart)).
     /// Nothing else depends on it.
@@ -181,6 +191,7 @@ impl Plans {
                 return Err(Error::new(ErrorKind::Range, &field, message));
             }
         }
+        non_negative("jitter", self.jitter)?;
         match self.search_budget {
             0 => Err(Error::new(ErrorKind::Range, "search_budget", "is 0, must be at least 1")),
             _ => Ok(()),
@@ -270,7 +281,8 @@ impl Filter {
         }
         let is_declared =
             [plans.errors.is_empty(), plans.rates.is_empty(), plans.gains.is_empty(), plans.lags.is_empty()]
-                .contains(&false);
+                .contains(&false)
+                || plans.jitter > 0.0;
         let is_uncertain = is_declared || !rows.errors.is_exact();
         if is_uncertain && self.integrator.is_some() {
             let message = "stands before an uncertain plant, for which no plan accounts yet";
@@ -342,6 +354,7 @@ impl Filter {
             errors: errors.sizes(*state_dim).into_iter().zip(own).map(|(rows, own)| rows.max(own)).collect(),
             gains: gains.chain(core::iter::repeat([1.0; 2])).take(*input_dim).collect(),
             lags: plans.lags.iter().copied().chain(core::iter::repeat([0.0; 2])).take(*input_dim).collect(),
+            jitter: plans.jitter,
         };
         if uncertainty.is_nothing() {
             return Ok(None);

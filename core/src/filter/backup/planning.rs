@@ -45,7 +45,7 @@ impl<'a> Planning<'a> {
 
     /// Whether a sample at `t` comes in time. A measured clock may be late, unless a tube says where the plant is until then.
     pub(super) fn in_time(&self, t: f64, hold: f64) -> bool {
-        let jitter = if self.uncertainty.is_some() { TOLERANCES.on_time } else { DECISIONS.jitter };
+        let jitter = self.uncertainty.map_or(DECISIONS.jitter, |of| of.jitter.max(TOLERANCES.on_time));
         // Behind a delay two inputs must not be on their way at once.
         let (delay, slack) = (self.rows.delay, TOLERANCES.on_time * hold);
         let last = self.before().last_time().unwrap_or(f64::NEG_INFINITY);
@@ -88,7 +88,7 @@ impl<'a> Planning<'a> {
                 return [self.bounds.min[i], self.bounds.max[i]];
             };
             let [low, high] = arrived.get(i).copied().unwrap_or([asked; 2]).map(|arrived| arrived - asked);
-            let [least, largest] = of.remains(i, since);
+            let [least, largest] = of.remains(i, since, 0.0);
             [asked + (low * least).min(low * largest), asked + (high * least).max(high * largest)]
         };
         (0..self.rows.input_dim).map(arrives).collect()
@@ -339,6 +339,8 @@ impl<'a> Planning<'a> {
                 measured,
                 acting: self.rows.acting(),
                 arrived: &arrived,
+                period: self.plans.period,
+                last: self.before().last_time().filter(|last| *last < t),
             }
         });
         let mut planner = Planner::new(plant, dims, bounds, &requirements, period, size)
@@ -381,10 +383,21 @@ impl<'a> Planning<'a> {
         trajectory
     }
 
+    /// Whether a plan for an uncertain plant has nearly ended: every new plan postpones the end, and there was none. `None` for
+    /// other plans, and with a horizon of the user's.
+    pub(super) fn is_nearly_over(&self, t: f64) -> Option<bool> {
+        let plan = &self.now().plan.backup_plan;
+        let over = t + DECISIONS.nearly_over * DECISIONS.uncertain_horizon;
+        (self.plans.horizon.is_none() && plan.tracking().is_some()).then_some(plan.until <= over)
+    }
+
     /// The time in s at which the filter next tries to prolong a plan that ends at `until`, seen from `t`: when the plan has
     /// become as short as allowed, and then more and more often until its end.
     pub(super) fn next_prolonging(&self, t: f64, until: f64) -> f64 {
-        let Some(horizon) = self.plans.horizon else { return f64::INFINITY };
+        let Some(horizon) = self.plans.horizon else {
+            let is_over = self.is_nearly_over(t) == Some(true);
+            return if is_over { t + DECISIONS.sooner * (until - t) } else { f64::INFINITY };
+        };
         let last = self.now().promises.iter().flatten().map(|promise| promise.from).fold(t, f64::max);
         let is_last = self.now().promises.iter().flatten().all(|promise| promise.until <= until);
         match until - horizon {

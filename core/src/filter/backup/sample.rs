@@ -335,12 +335,21 @@ impl Decision<'_> {
     /// Looks for a plan that ends later than the current one, if it is due.
     fn prolong(&mut self, At { t, hold, x }: At<'_>, u: &[f64]) {
         let PlanState { promises, plan, prolong_at, .. } = self.now();
-        if t < *prolong_at {
+        let is_due = match self.planning().is_nearly_over(t) {
+            Some(is_nearly_over) => is_nearly_over && (t >= *prolong_at || *prolong_at == f64::INFINITY),
+            None => t >= *prolong_at,
+        };
+        if !is_due {
             return;
+        }
+        let mut promises = promises.clone();
+        if self.planning().is_nearly_over(t).is_some() {
+            // A plan that nothing else prolonged may use its reserve up.
+            promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);
         }
         let longer = self
             .planning()
-            .planned(promises, (t, hold), u, |planner| planner.beyond(&plan.backup_plan).search(t, x))
+            .planned(&promises, (t, hold), u, |planner| planner.beyond(&plan.backup_plan).search(t, x))
             .ok()
             .filter(|longer| longer.backup_plan.until > plan.backup_plan.until);
         if let Some(longer) = longer {

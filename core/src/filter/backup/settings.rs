@@ -69,6 +69,8 @@ pub(super) struct DecisionSettings {
     /// How far in s a plan for an uncertain plant reaches past the last deadline and the sample, if nothing else is asked
     /// for.
     pub(super) uncertain_horizon: f64,
+    /// The part of it that is left when another plan is sought.
+    pub(super) nearly_over: f64,
 
     // The plant beside its model.
     /// Shortest time over which a deviation is measured, as a part of a period.
@@ -162,6 +164,9 @@ pub(super) const DECISIONS: DecisionSettings = DecisionSettings {
     // The tube of a vehicle at rest grows slowly, and every sample that lets another input pass begins a new one. With more, a
     // search takes longer; with less, a promise ends sooner if no other input passes any more.
     uncertain_horizon: 3.0,
+    // The law prolongs a plan long before (`Planner::prolonged`). With more, searches come early; with less, they have fewer
+    // samples to find a plan.
+    nearly_over: 0.6,
 
     // Over less it is round-off: a deviation is a difference of states divided by the time.
     stretch: 0.5,

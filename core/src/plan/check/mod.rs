@@ -415,9 +415,7 @@ impl<'a> Walk<'a> {
         if let Some(tube) = &mut self.tube {
             let (plant, tolerances) = (self.model.plant, self.tolerances);
             let piece = Piece { path: &path, over: &over, dt, u };
-            if !tube.advance(plant, piece, |i| allowed(tolerances, over[i][0])) {
-                return Err(Failure::Spreads);
-            }
+            tube.advance(plant, piece, |i| allowed(tolerances, over[i][0]))?;
         }
         let mut in_force = (0..self.requirements.len()).filter(|i| self.requirements[*i].is_in_force(from));
         let met = in_force.try_for_each(|i| {

@@ -29,6 +29,16 @@ pub(crate) struct Uncertain<'a> {
     pub(crate) acting: [f64; MAX_INPUTS],
     /// What may arrive of each input then, if inputs are followed late; otherwise, or if empty, that input.
     pub(crate) arrived: &'a [[f64; 2]],
+    /// The time in s after which samples are expected, and when the last input began to act.
+    pub(crate) period: f64,
+    pub(crate) last: Option<f64>,
+}
+
+impl Uncertain<'_> {
+    /// By how much in s an input may come late; 0 if it comes as expected.
+    fn latest(&self) -> f64 {
+        if self.of.jitter > 0.0 { (1.0 + self.of.jitter) * self.period } else { 0.0 }
+    }
 }
 
 /// The part of half the width of its bounds that the first search leaves of an input.
@@ -41,6 +51,8 @@ const MOST_RESERVE: f64 = 0.7;
 const HOLDS: [usize; 2] = [250, 800];
 /// The least ratio of the number of samples of a hold to that of the one before, until it is the longest.
 const LONGER: f64 = 1.25;
+/// A plan that ends sooner than this part of the horizon after the last deadline is prolonged by its law.
+const SHORT: f64 = 0.7;
 /// Rounds of search and tube.
 const ROUNDS: u32 = 8;
 /// Factor on what the last round lacked.
@@ -51,15 +63,17 @@ const MORE: f64 = 1.2;
 struct Asks {
     /// The part of every bound that it leaves to the feedback, in the unit of the input.
     reserve: Vec<f64>,
-    /// How much more margin each requirement gets, in the unit of h.
+    /// How much more margin each requirement gets, in the unit of h, and from when in s.
     raised: Vec<f64>,
+    since: Vec<f64>,
 }
 
 impl Asks {
     /// Half way to `other`.
     fn between(&self, other: &Self) -> Self {
         let half = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| 0.5 * (a + b)).collect();
-        Self { reserve: half(&self.reserve, &other.reserve), raised: half(&self.raised, &other.raised) }
+        let (reserve, raised) = (half(&self.reserve, &other.reserve), half(&self.raised, &other.raised));
+        Self { reserve, raised, since: self.since.clone() }
     }
 }
 
@@ -81,16 +95,20 @@ impl<'a> Planner<'a> {
         let mut asks = Asks {
             reserve: reach.iter().map(|reach| FIRST_RESERVE * reach).collect(),
             raised: vec![0.0; self.requirements.len()],
+            since: vec![f64::INFINITY; self.requirements.len()],
         };
         let (mut failure, mut last): (Option<Failure>, Option<Asks>) = (None, None);
         for _ in 0..ROUNDS {
             let bounds = narrowed(uncertain.bounds, &asks.reserve);
-            let raise = |(r, more): (&Requirement<'a>, &f64)| match *more > 0.0 {
-                true => Requirement { reserve: r.reserve.max(r.margin) + more, ..*r },
-                false => *r,
-            };
+            // A state near the edge of a set has until then to leave it.
+            let raised = self.requirements.iter().zip(asks.raised.iter().zip(&asks.since));
+            let raised = raised.filter(|(_, (more, _))| **more > 0.0).map(|(r, (more, since))| Requirement {
+                reserve: r.reserve.max(r.margin) + more,
+                from: r.from.max(*since),
+                ..*r
+            });
             let requirements: Vec<Requirement<'_>> =
-                self.requirements.iter().zip(&asks.raised).map(raise).collect();
+                self.requirements.iter().copied().chain(raised).collect();
             let nominal = Planner { uncertain: None, bounds: &bounds, requirements: &requirements, ..*self };
             let plan = match nominal.search(t, x) {
                 Ok(plan) => plan,
@@ -104,13 +122,16 @@ impl<'a> Planner<'a> {
                     None => return Err(nearest),
                 },
             };
-            let (lacks, found) = match self.tracked(uncertain, &plan, t, x, true)? {
+            let (lacks, found) = match self.tracked(uncertain, &plan, (t, x), 1.0, true)? {
                 Ok(backup_plan) => return Ok(Plan { backup_plan, reserve: asks.reserve, ..plan }),
                 Err(lacks) => (lacks, asks.clone()),
             };
             failure = lacks.failure;
             for (raised, missing) in asks.raised.iter_mut().zip(&lacks.missing) {
                 *raised += MORE * missing;
+            }
+            for (since, lacked) in asks.since.iter_mut().zip(&lacks.since) {
+                *since = since.min(*lacked);
             }
             for ((reserve, over), reach) in asks.reserve.iter_mut().zip(&lacks.reserve).zip(&reach) {
                 if *over > 0.0 {
@@ -138,7 +159,7 @@ impl<'a> Planner<'a> {
         let Some(uncertain) = self.uncertain else { return Ok(nominal) };
         let tracking = plan.backup_plan.tracking.clone();
         let nominal = Plan { backup_plan: BackupPlan { tracking, ..nominal }, ..plan.clone() };
-        self.tracked(uncertain, &nominal, t, x, false)?
+        self.tracked(uncertain, &nominal, (t, x), 1.0, false)?
             .map_err(|lacks| lacks.failure.unwrap_or(Failure::Spreads))
     }
 
@@ -149,7 +170,7 @@ impl<'a> Planner<'a> {
     /// What it lacks.
     pub(crate) fn bears(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<(), Failure> {
         let uncertain = self.uncertain.ok_or(Failure::Nothing)?;
-        match self.tracked(uncertain, plan, t, x, false)? {
+        match self.tracked(uncertain, plan, (t, x), 1.0, false)? {
             Ok(_) => Ok(()),
             Err(lacks) => Err(lacks.failure.unwrap_or(Failure::Spreads)),
         }
@@ -165,8 +186,8 @@ impl<'a> Planner<'a> {
         &self,
         uncertain: Uncertain<'_>,
         plan: &Plan,
-        t: f64,
-        x: &[f64],
+        (t, x): (f64, &[f64]),
+        strictness: f64,
         records: bool,
     ) -> Result<Result<BackupPlan, Box<Lacks>>, Failure> {
         let until = match plan.is_finite() {
@@ -187,11 +208,16 @@ impl<'a> Planner<'a> {
         };
         let slack = self.tolerances.on_time * self.period;
         let (mut least, mut failure) = (None, Failure::Spreads);
+        // Where samples may come late, each hold has one.
+        let (jitter, whole) = (uncertain.of.jitter, uncertain.of.jitter as usize);
+        let quickest = 1 + whole + usize::from(jitter > whole as f64);
         for longest in longest {
             // What the quickest law lacks counts.
             least = None;
-            let times: Vec<f64> =
-                begins(samples, longest).into_iter().map(|k| t + k as f64 * self.period).collect();
+            let times: Vec<f64> = begins(samples, [quickest, longest])
+                .into_iter()
+                .map(|k| t + k as f64 * self.period)
+                .collect();
             let (states, inputs) = self.reference(plan, &times, x);
             let kept =
                 |k: usize| before.and_then(|before| before.gain_at(times[k], slack)).map(<[f64]>::to_vec);
@@ -203,7 +229,7 @@ impl<'a> Planner<'a> {
                 gains[0].clear();
                 let reference =
                     Tracking { times: times.clone(), inputs: inputs.clone(), gains, ..Tracking::default() };
-                match self.checked(uncertain, plan, reference, (until, x), records) {
+                match self.checked(uncertain, plan, reference, (until, x), (strictness, records)) {
                     Ok(Ok(backup_plan)) => return Ok(Ok(backup_plan)),
                     Ok(Err(lacks)) => {
                         let parts =
@@ -257,7 +283,7 @@ impl<'a> Planner<'a> {
         plan: &Plan,
         law: Tracking,
         (until, x): (f64, &[f64]),
-        records: bool,
+        (strictness, records): (f64, bool),
     ) -> Result<Result<BackupPlan, Box<Lacks>>, Failure> {
         let Tracking { times, inputs, gains, .. } = law;
         let model = self.model(self.period);
@@ -265,7 +291,7 @@ impl<'a> Planner<'a> {
         tube.records = records;
         let x = begin.as_deref().unwrap_or(x);
         let grid = Grid { period: self.period, even: true };
-        let mut walk = Walk::new(model, self.tolerances, self.requirements, 1.0, grid, (times[0], x))?
+        let mut walk = Walk::new(model, self.tolerances, self.requirements, strictness, grid, (times[0], x))?
             .after(&plan.backup_plan)
             .within(tube)?;
         let (mut states, mut radii) = (Vec::with_capacity(inputs.len()), Vec::with_capacity(inputs.len()));
@@ -274,6 +300,12 @@ impl<'a> Planner<'a> {
             radii.extend(walk.tube().map(|tube| tube.radii()));
             let gain = Some(&gains[k][..]).filter(|gain| !gain.is_empty());
             walk.hold_in_tube(&inputs[k], gain, times[k + 1])?;
+            // A sample may come within the hold.
+            if uncertain.latest() > 0.0
+                && let (Some(radii), Some(tube)) = (radii.last_mut(), walk.tube())
+            {
+                *radii = tube.widest();
+            }
         }
         let (backup_plan, tube) = walk.finish();
         let lacks = tube.map(|tube| Box::new(tube.lacks)).unwrap_or_default();
@@ -297,10 +329,10 @@ impl<'a> Planner<'a> {
         &'b self,
         uncertain: Uncertain<'b>,
     ) -> Result<(Tube<'b>, Option<Vec<f64>>), Failure> {
-        let Uncertain { of, bounds, delay, measured, acting, arrived, .. } = uncertain;
+        let Uncertain { of, bounds, delay, measured, acting, arrived, period, .. } = uncertain;
         let arrives = |i: usize| arrived.get(i).copied().unwrap_or([acting[i]; 2]);
         let arrives: Vec<[f64; 2]> = (0..self.dims[1]).map(arrives).collect();
-        let tube = Tube::around(self.plant, (of, delay), bounds, self.dims, self.requirements)
+        let tube = Tube::around(self.plant, (of, [delay, period]), bounds, self.dims, self.requirements)
             .ok_or(Failure::Spreads)?
             .acted_on(&arrives);
         let Some((t, x)) = measured else { return Ok((tube, None)) };
@@ -317,15 +349,23 @@ impl<'a> Planner<'a> {
     ///
     /// By how much it is not.
     pub(crate) fn is_declared(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<(), Failure> {
-        let (Some(_), Some(tracking)) = (self.uncertain, &plan.backup_plan.tracking) else {
-            return Ok(());
-        };
-        let escaped =
-            tracking.at(t, self.tolerances.on_time * self.period).and_then(|k| tracking.escaped(k, x));
-        match escaped {
+        let (Some(_), Some(tracking)) = (self.uncertain, &plan.backup_plan.tracking) else { return Ok(()) };
+        match self.seen(tracking, t).and_then(|(k, z)| tracking.escaped((k, &z), x)) {
             Some((state, beyond)) => Err(Failure::Undeclared { state, beyond }),
             None => Ok(()),
         }
+    }
+
+    /// The hold of `law` at `t`, and its reference there: at the beginning of a hold, or anywhere if samples may be late.
+    fn seen(&self, law: &Tracking, t: f64) -> Option<(usize, Vec<f64>)> {
+        let slack = self.tolerances.on_time * self.period;
+        let is_late = self.uncertain.is_some_and(|uncertain| uncertain.latest() > 0.0);
+        let k = if is_late { law.during(t, slack) } else { law.at(t, slack) }?;
+        let mut z = law.states[k].clone();
+        if t > law.times[k] + slack {
+            Self { period: t - law.times[k], ..*self }.run(&mut z, &law.inputs[k]);
+        }
+        Some((k, z))
     }
 
     /// The remainder of `plan` from `x` at `t` by its law, for an uncertain plant: at one of its samples by the feedback, within a hold
@@ -342,17 +382,50 @@ impl<'a> Planner<'a> {
             let slack = self.tolerances.on_time * self.period;
             let mut inputs = plan.backup_plan.inputs.clone();
             inputs.retain(|(end, _)| *end > t + slack);
-            let Some(hold) = inputs.first_mut().filter(|(end, _)| t + self.period <= end + slack) else {
-                return Err(Failure::NoRest);
+            let latest = uncertain.latest();
+            let end = tracking.times.last().copied().unwrap_or(t);
+            // A law for samples that come late says what to do until the latest, wherever in a hold that is.
+            let covers = |(of_hold, _): &&mut (f64, _)| match latest > 0.0 {
+                true => self.period <= latest + slack && t + latest <= end + slack,
+                false => t + self.period <= of_hold + slack,
             };
-            if let Some(k) = tracking.at(t, slack) {
-                tracking.input(k, x, &mut hold.1[..self.dims[1]]);
+            let Some(hold) = inputs.first_mut().filter(covers) else { return Err(Failure::NoRest) };
+            let begins = |k: usize| uncertain.last.is_none_or(|last| last < tracking.times[k] - slack);
+            if let Some((k, z)) = self.seen(tracking, t).filter(|(k, _)| latest == 0.0 || begins(*k)) {
+                tracking.input((k, &z), x, &mut hold.1[..self.dims[1]]);
                 for (i, u) in hold.1.iter_mut().enumerate().take(self.dims[1]) {
                     *u = uncertain.bounds.clamp(i, *u);
                 }
             }
             Ok(BackupPlan { inputs, ..plan.backup_plan.clone() })
         }))
+    }
+
+    /// `kept`, what is left of `plan` from `x` at `t` by its law. Once that has become short: where the law leads the model
+    /// from here, as a reference of its own, with an end as late as that of any new plan.
+    pub(crate) fn prolonged(&self, plan: &Plan, kept: BackupPlan, t: f64, x: &[f64]) -> BackupPlan {
+        let (Some(uncertain), Some(tracking)) = (self.uncertain, &kept.tracking) else { return kept };
+        if plan.is_finite() || kept.until >= self.last(t) + SHORT * uncertain.horizon {
+            return kept;
+        }
+        let (model, mut at, mut z) = (self.model(self.period), t, x.to_vec());
+        let mut inputs = kept.inputs.clone();
+        for (end, u) in &mut inputs {
+            let u = &mut u[..self.dims[1]];
+            if at > t
+                && let Some((k, reference)) = self.seen(tracking, at)
+            {
+                tracking.input((k, &reference), &z, u);
+                model.clamp(u);
+            }
+            model.flow(&mut z, u, *end - at);
+            at = *end;
+        }
+        let from_here = Plan { backup_plan: BackupPlan { inputs, ..kept.clone() }, ..plan.clone() };
+        match self.tracked(uncertain, &from_here, (t, x), self.tolerances.kept, false) {
+            Ok(Ok(prolonged)) => prolonged,
+            _ => kept,
+        }
     }
 
     /// Half the widths of the bounds of the inputs.
@@ -362,13 +435,13 @@ impl<'a> Planner<'a> {
     }
 }
 
-/// The samples at which the holds of a law begin, of `samples` samples, and the end of the last: each up to `longest` samples
-/// long.
-fn begins(samples: usize, longest: usize) -> Vec<usize> {
-    let (mut begins, mut length) = (vec![0, 1], 1.0_f64);
+/// The samples at which the holds of a law begin, of `samples` samples, and the end of the last. After the first they get
+/// longer, from `least` to `longest` samples.
+fn begins(samples: usize, [least, longest]: [usize; 2]) -> Vec<usize> {
+    let (mut begins, mut length) = (vec![0, 1], least as f64);
     while begins.last().is_some_and(|last| *last < samples) {
-        length = (length * LONGER).min(longest as f64);
         begins.push(begins[begins.len() - 1] + length as usize);
+        length = (length * LONGER).min(longest.max(least) as f64);
     }
     begins
 }

@@ -68,6 +68,8 @@ const LATE_GENERATORS: usize = 200;
 const GUESSES: u32 = 8;
 /// Part by which a guess exceeds what followed from the one before.
 const WIDER: f64 = 0.02;
+/// The factor by which the first guess of what is asked late exceeds what follows from the beginning.
+const AHEAD: f64 = 1.2;
 /// The least size of a deviation: far below what any promise resolves, and above round-off.
 const LEAST: f64 = 1e-12;
 /// Round-off of a hundred operations on numbers up to a size, as a part of it.
@@ -84,6 +86,9 @@ pub(crate) struct Uncertainty {
     pub(crate) gains: Vec<[f64; 2]>,
     /// The time constant in s with which each input is followed, from the least to the largest.
     pub(crate) lags: Vec<[f64; 2]>,
+    /// By how much of a period a sample may come after it was expected. If 0, samples come as expected; otherwise also at any
+    /// time before.
+    pub(crate) jitter: f64,
 }
 
 impl Uncertainty {
@@ -92,6 +97,7 @@ impl Uncertainty {
         self.rates.iter().chain(&self.errors).all(|size| *size == 0.0)
             && self.gains.iter().all(|gain| *gain == [1.0; 2])
             && !self.lags()
+            && self.jitter == 0.0
     }
 }
 
@@ -102,15 +108,21 @@ impl Uncertainty {
     }
 
     /// What remains of a difference of input `i` from what is asked of it after `dt` s, as a part of it: the least and the
-    /// largest.
-    pub(crate) fn remains(&self, i: usize, dt: f64) -> [f64; 2] {
-        self.lags[i].map(|lag| if lag > 0.0 { elementary::exp(-dt / lag) } else { 0.0 })
+    /// largest. It may be asked for anew at any time in the first `held` s.
+    pub(crate) fn remains(&self, i: usize, dt: f64, held: f64) -> [f64; 2] {
+        let remains = |lag: f64, dt: f64| match lag > 0.0 {
+            true => elementary::exp(-dt / lag),
+            false => f64::from(dt <= 0.0 && held > 0.0),
+        };
+        [remains(self.lags[i][0], dt), remains(self.lags[i][1], dt - held)]
     }
 
     /// The mean of that over `dt` s.
-    fn remains_on_average(&self, i: usize, dt: f64) -> [f64; 2] {
+    fn remains_on_average(&self, i: usize, dt: f64, held: f64) -> [f64; 2] {
         // It rises with the lag.
-        self.lags[i].map(|lag| if lag > 0.0 { lag / dt * (1.0 - elementary::exp(-dt / lag)) } else { 0.0 })
+        let integral =
+            |lag: f64, dt: f64| if lag > 0.0 { lag * (1.0 - elementary::exp(-dt / lag)) } else { 0.0 };
+        [integral(self.lags[i][0], dt) / dt, (held + integral(self.lags[i][1], dt - held)) / dt]
     }
 }
 
@@ -124,6 +136,8 @@ pub(super) struct Lacks {
     /// The largest loss of h of each requirement where it is not met, and the most that it lacks, in its unit.
     pub(super) falls: Vec<f64>,
     pub(super) missing: Vec<f64>,
+    /// When in s it first lacks it.
+    pub(super) since: Vec<f64>,
     /// The first requirement, or input, that is not met.
     pub(super) failure: Option<Failure>,
 }
@@ -133,18 +147,30 @@ pub(super) struct Tube<'a> {
     of: &'a Uncertainty,
     bounds: &'a Bounds,
     /// How long in s after its sample an input begins to act, and how far the state that is predicted for then may be from
-    /// the true one.
+    /// the true one; by how much in s an input after the first may come late, and how much of that is left of this hold.
     delay: f64,
+    latest: f64,
+    held: f64,
     unseen: Vec<f64>,
     next_unseen: Vec<f64>,
     /// Number of states, and of inputs.
     dims: [usize; 2],
-    /// Deviations of the states; if inputs are followed late, of what arrives from what is asked; and of the inputs asked while
+    /// Deviations of the states; if inputs are late, of what arrives from what is asked; and of the inputs asked while
     /// they are held.
     set: Zonotope,
     /// The number of rows of the second kind, 0 or one for each input, and the last inputs asked of the reference.
     late: usize,
     last: Vec<f64>,
+    /// The largest sizes of these rows, if inputs come late.
+    lates: Vec<f64>,
+    /// What is left of them from earlier holds.
+    lefts: Vec<f64>,
+    /// The gain of this hold, if inputs come late; empty for 0.
+    gain: Vec<f64>,
+    /// If inputs come late: by how much the answer of this hold, and of the two before, may differ from that to the state at
+    /// its beginning; and of all of them, as it arrives.
+    differs: [[f64; MAX_INPUTS]; 3],
+    arrives: [f64; MAX_INPUTS],
     /// The largest share of each input so far that answers an error of measurement, if inputs are followed late. What arrives
     /// of it then is a mean of earlier ones, and no larger.
     noise: Vec<f64>,
@@ -153,6 +179,8 @@ pub(super) struct Tube<'a> {
     /// The largest deviation on the last piece, and how far one moves there.
     reach: Vec<f64>,
     moved: Vec<f64>,
+    /// The largest deviation of every state in this hold.
+    widest: Vec<f64>,
     /// How far a deviation may be on the last piece from the line between its beginning and its end.
     bulge: Vec<f64>,
     /// Whether everything is recorded in `lacks` that is not met. Otherwise the first of it ends the check.
@@ -186,11 +214,10 @@ pub(super) struct Piece<'a> {
 
 impl<'a> Tube<'a> {
     /// The tube that begins within the errors of measurement around the reference, for inputs that act `delay` s after their
-    /// sample. `None` if the plant has no derivatives on
-    /// enclosures.
+    /// sample, and samples that are expected every `period` s. `None` if the plant has no derivatives on enclosures.
     pub(super) fn around(
         plant: &dyn Predict,
-        (of, delay): (&'a Uncertainty, f64),
+        (of, [delay, period]): (&'a Uncertainty, [f64; 2]),
         bounds: &'a Bounds,
         dims: [usize; 2],
         requirements: &[Requirement<'_>],
@@ -209,11 +236,14 @@ impl<'a> Tube<'a> {
                 None => false,
             })
         };
-        let late = if of.lags() { m } else { 0 };
+        let late = if of.lags() || of.jitter > 0.0 { m } else { 0 };
+        let latest = if of.jitter > 0.0 { (1.0 + of.jitter) * period } else { 0.0 };
         let mut tube = Self {
             of,
             bounds,
             delay,
+            latest,
+            held: 0.0,
             unseen: of.errors.clone(),
             next_unseen: of.errors.clone(),
             dims,
@@ -221,14 +251,21 @@ impl<'a> Tube<'a> {
             before: Zonotope::point(n + late + m),
             late,
             last: vec![0.0; m],
+            lates: vec![0.0; m],
+            lefts: vec![0.0; m],
+            gain: Vec::new(),
+            differs: [[0.0; MAX_INPUTS]; 3],
+            arrives: [0.0; MAX_INPUTS],
             noise: vec![0.0; m],
             reach: vec![0.0; n + late + m],
             moved: vec![0.0; n],
+            widest: vec![0.0; n],
             bulge: vec![0.0; n],
             records: false,
             lacks: Lacks {
                 falls: vec![0.0; requirements.len()],
                 missing: vec![0.0; requirements.len()],
+                since: vec![f64::INFINITY; requirements.len()],
                 ..Lacks::default()
             },
             plant: bends,
@@ -260,6 +297,11 @@ impl<'a> Tube<'a> {
         self.reach.iter().zip(&self.next_unseen).map(|(reach, unseen)| reach + unseen).collect()
     }
 
+    /// The same at any time of the last hold.
+    pub(super) fn widest(&self) -> Vec<f64> {
+        self.widest.iter().zip(&self.next_unseen).map(|(reach, unseen)| reach + unseen).collect()
+    }
+
     /// Begins a hold of `v` from the reference state `z`, with the feedback `gain` (by input and state) of a measurement
     /// there; without one the input is `v` alone.
     ///
@@ -276,6 +318,26 @@ impl<'a> Tube<'a> {
         // generators has to keep these and what is late from now on.
         let share = |i: usize, j: usize| gain.map_or(0.0, |gain| gain[i * n + j]);
         let late = self.late;
+        let mut along = vec![0.0; kept + m];
+        for i in 0..late {
+            // The jump of what is asked.
+            (0..n).for_each(|j| along[j] = share(i, j));
+            along[kept + i] = -1.0;
+            let jump = v[i] - self.last[i] + zonotope::dot(&along, &self.set.centre);
+            let spread = self.set.half_width(&along, &mut self.rooms.parts);
+            // The input of a measurement here comes in time.
+            let is_in_time = gain.is_none() && self.of.lags[i][1] == 0.0;
+            let size = (self.reach[n + i] + jump.abs() + spread) * (1.0 + ROUND_OFF);
+            self.lefts[i] = self.reach[n + i];
+            self.lates[i] = if is_in_time { 0.0 } else { size };
+            along[kept + i] = 0.0;
+        }
+        self.widest.fill(0.0);
+        self.held = if gain.is_some() { self.latest } else { 0.0 };
+        self.differs.rotate_right(1);
+        self.differs[0] = [0.0; MAX_INPUTS];
+        self.gain.clear();
+        self.gain.extend_from_slice(gain.filter(|_| self.latest > 0.0).unwrap_or_default());
         if late > 0 {
             self.set.map(|i, j| match (i.checked_sub(n), i.checked_sub(kept)) {
                 (Some(input), None) if j < n => -share(input, j),
@@ -283,7 +345,7 @@ impl<'a> Tube<'a> {
                 _ => f64::from(i == j),
             });
         }
-        let generators = if late > 0 { LATE_GENERATORS } else { GENERATORS };
+        let generators = if self.of.lags() { LATE_GENERATORS } else { GENERATORS };
         self.set.reduce(generators, kept, &sizes, &mut self.rooms.scores);
         self.set.map(|i, j| match i.checked_sub(kept) {
             Some(input) => {
@@ -319,8 +381,14 @@ impl<'a> Tube<'a> {
             }
         }
         self.set.reach(&mut self.reach);
-        for (i, v) in v.iter().enumerate() {
-            let share = (self.reach[kept + i] + noises[i]) * (1.0 + ROUND_OFF);
+        self.is_bounded(v, &noises)
+    }
+
+    /// Checks that the inputs of the law, `others` more than the zonotope says, are within their bounds.
+    fn is_bounded(&mut self, v: &[f64], others: &[f64]) -> Result<(), Failure> {
+        let kept = self.dims[0] + self.late;
+        for (i, (v, other)) in v.iter().zip(others).enumerate() {
+            let share = (self.reach[kept + i] + other) * (1.0 + ROUND_OFF);
             self.lacks.feedback[i] = self.lacks.feedback[i].max(share);
             let over = (v + share - self.bounds.max[i]).max(self.bounds.min[i] - v + share);
             // NaN is not within bounds.
@@ -341,23 +409,27 @@ impl<'a> Tube<'a> {
     /// Records that requirement `i` is not met, or ends the check with it.
     pub(super) fn lack_of(&mut self, i: usize, fall: f64, failure: Failure) -> Result<(), Failure> {
         self.lacks.falls[i] = self.lacks.falls[i].max(fall);
-        if let Failure::Broken { slack, .. } = failure {
+        if let Failure::Broken { time, slack, .. } = failure {
             self.lacks.missing[i] = self.lacks.missing[i].max(-slack);
+            self.lacks.since[i] = self.lacks.since[i].min(time);
         }
         self.lack(failure)
     }
 
     /// Moves the tube along `piece`, of which `residual` says how far the state may be from the reference at its end.
-    /// Returns whether a bound was found.
+    ///
+    /// # Errors
+    ///
+    /// No bound is found; an input that leaves its bounds.
     pub(super) fn advance(
         &mut self,
         model: &dyn Predict,
         piece: Piece<'_>,
         residual: impl Fn(usize) -> f64,
-    ) -> bool {
+    ) -> Result<(), Failure> {
         let Piece { path, over, dt, u } = piece;
         let ([n, m], kept) = (self.dims, self.dims[0] + self.late);
-        let Self { of, set, before, late, noise, reach, moved, bulge, plant, rooms, .. } = self;
+        let Self { of, set, before, late, noise, reach, moved, bulge, plant, rooms, gain, latest, .. } = self;
         let Rooms { variables, rates, at: here, slopes, curvatures, .. } = rooms;
         before.clone_from(set);
         rates.resize(n, Second::from(0.0));
@@ -366,6 +438,12 @@ impl<'a> Tube<'a> {
             model.second_rates(x, u, out)
         };
         set.reach(reach);
+        let held = self.held.min(dt);
+        self.held -= held;
+        if *latest == 0.0 && *late > 0 {
+            self.lates.copy_from_slice(&reach[n..kept]);
+        }
+        let (lates, lefts) = (&mut self.lates, &self.lefts);
         // The first derivatives in the middle, and how far the reference is from there.
         here.clear();
         here.extend(path.iter().map(|c| Interval::from(at(c, 0.5 * dt))));
@@ -390,30 +468,68 @@ impl<'a> Tube<'a> {
         let slope = |i: usize, j: usize| slopes[i * (n + m) + j];
         // What arrives of an input differs from v by `part` of its deviation asked and of `mean` times its late one, by `fixed`,
         // and by at most `spread`; of its late deviation at most `changes` is not in the mean. Altogether by at most `most`.
-        let arrives: Vec<Arrives> = (0..m)
-            .map(|i| {
-                let [least, largest] = of.gains[i];
-                let (part, half) = (0.5 * (least + largest), 0.5 * (largest - least) * (1.0 + 1e-15));
-                let late = if *late > 0 { reach[n + i] } else { 0.0 };
-                let (mean, differs) = middle(of.remains_on_average(i, dt));
-                let (asked, fixed) = (reach[kept + i] + noise[i], (part - 1.0) * u[i]);
-                let gained = half * (u[i].abs() + asked + late);
-                Arrives {
-                    part,
-                    mean,
-                    fixed,
-                    spread: gained + part * (differs * late + noise[i]),
-                    changes: part * late,
-                    most: (part * (asked + late) + fixed.abs() + gained) * (1.0 + ROUND_OFF),
-                }
-            })
-            .collect();
-        // Bounds on the deviations while the piece lasts: guessed, and verified.
-        let begin: Vec<f64> =
-            (0..n + m).map(|i| if i < n { reach[i] } else { arrives[i - n].most }).collect();
-        let mut most: Vec<f64> = begin.clone();
+        let arrives = |i: usize, differs: f64| {
+            let [least, largest] = of.gains[i];
+            let (part, half) = (0.5 * (least + largest), 0.5 * (largest - least) * (1.0 + 1e-15));
+            let (mean, around) = middle(of.remains_on_average(i, dt, held));
+            let (late, apart) = (lates[i], noise[i] + differs);
+            let (asked, fixed) = (reach[kept + i] + apart, (part - 1.0) * u[i]);
+            let gained = half * (u[i].abs() + asked + late);
+            // What follows late changes before it is asked anew, and so does what is left of earlier holds.
+            let left = if of.lags[i][1] > 0.0 { late } else { lefts[i] };
+            Arrives {
+                apart: gained + part * (apart + left),
+                part,
+                mean,
+                fixed,
+                spread: gained + part * (around * late + apart),
+                changes: part * late,
+                most: (part * (asked + late) + fixed.abs() + gained) * (1.0 + ROUND_OFF),
+            }
+        };
         let linear =
             |i: usize, most: &[f64]| (0..n + m).map(|j| slope(i, j).value().abs() * most[j]).sum::<f64>();
+        let recent = |i: usize| self.differs.iter().map(|differs| differs[i]).fold(self.arrives[i], f64::max);
+        let mut differs: Vec<f64> = (0..m).map(recent).collect();
+        let mut arriving: Vec<Arrives> = (0..m).map(|i| arrives(i, differs[i])).collect();
+        // By how much an answer to a later state may differ from that to the state at the beginning of the hold: its rate there,
+        // of which the zonotope knows how much the states and inputs cancel, and what changes that rate.
+        let turns: Vec<f64> = (gain.chunks_exact(n))
+            .map(|gain| {
+                let along = |j: usize| (0..n).map(|l| gain[l] * slope(l, j).value()).sum::<f64>();
+                let mut direction = vec![0.0; kept + m];
+                (0..n).for_each(|j| direction[j] = along(j));
+                for (j, input) in arriving.iter().enumerate() {
+                    let by = along(n + j) * input.part;
+                    direction[kept + j] = by;
+                    // Until the next sample what was asked before acts.
+                    direction[n..kept].iter_mut().skip(j).take(1).for_each(|late| *late = by);
+                }
+                let fixed: f64 =
+                    arriving.iter().enumerate().map(|(j, input)| along(n + j) * input.fixed).sum();
+                (fixed + zonotope::dot(&direction, &set.centre)).abs()
+                    + set.half_width(&direction, &mut rooms.parts)
+            })
+            .collect();
+        let answer = |i: usize, others: &[f64], moved: &[f64], arriving: &[Arrives]| {
+            let Some(turn) = turns.get(i) else { return 0.0 };
+            let changes = |j: usize| {
+                let turned: f64 = (0..n).map(|l| slope(j, l).value().abs() * moved[l]).sum();
+                let inputs: f64 = (arriving.iter().enumerate())
+                    .map(|(q, input)| slope(j, n + q).value().abs() * input.apart)
+                    .sum();
+                gain[i * n + j].abs() * (turned + others[j] + inputs)
+            };
+            *latest * (turn + (0..n).map(changes).sum::<f64>()) * (1.0 + ROUND_OFF)
+        };
+        for i in 0..turns.len() {
+            differs[i] = differs[i].max(AHEAD * answer(i, &of.rates, &vec![0.0; n], &arriving));
+            arriving[i] = arrives(i, differs[i]);
+        }
+        // Bounds on the deviations while the piece lasts: guessed, and verified.
+        let begin: Vec<f64> =
+            (0..n + m).map(|i| if i < n { reach[i] } else { arriving[i - n].most }).collect();
+        let mut most: Vec<f64> = begin.clone();
         for i in 0..n {
             most[i] = (begin[i] + dt * (linear(i, &begin) + of.rates[i])) * (1.0 + WIDER) + LEAST;
         }
@@ -449,14 +565,24 @@ impl<'a> Tube<'a> {
                 is_found &= wanted <= most[i];
                 next[i] = wanted * (1.0 + WIDER) + LEAST;
             }
+            for (i, differs) in differs.iter_mut().enumerate().take(gain.len() / n) {
+                let wanted = answer(i, &others, moved, &arriving);
+                if wanted > *differs || wanted.is_nan() {
+                    is_found = false;
+                    *differs = wanted * AHEAD + LEAST;
+                    arriving[i] = arrives(i, *differs);
+                    next[n + i] = arriving[i].most;
+                }
+            }
             if is_found || !all_finite(&next) {
                 break;
             }
             most = next;
         }
         if !is_found {
-            return false;
+            return Err(Failure::Spreads);
         }
+        let arrives = arriving;
         // The linear part over the piece: e^(M dt), and its integral times N.
         let drift: Vec<f64> = (0..n * n).map(|k| slope(k / n, k % n).value() * dt).collect();
         let [flow, integral] = exponential(&drift, n);
@@ -516,7 +642,7 @@ impl<'a> Tube<'a> {
             (true, None, _) => flow[i * n + j],
             (true, _, Some(input)) => driven[i * m + input],
             (true, Some(input), None) => driven[i * m + input] * arrives[input].mean,
-            (false, Some(input), None) if i == j => middle(of.remains(input, dt)).0,
+            (false, Some(input), None) if i == j => middle(of.remains(input, dt, held)).0,
             _ => f64::from(i == j),
         });
         for (i, row) in integral.chunks_exact(n).enumerate() {
@@ -539,17 +665,37 @@ impl<'a> Tube<'a> {
             set.push((0..n).map(|i| slope(i, n + j).value() * spread * dt));
         }
         for i in 0..*late {
-            let (_, differs) = middle(of.remains(i, dt));
-            set.push_along(n + i, (differs * reach[n + i]) * (1.0 + ROUND_OFF));
+            let remains = of.remains(i, dt, held);
+            set.push_along(n + i, (middle(remains).1 * lates[i]) * (1.0 + ROUND_OFF));
         }
         for (i, side) in sides.iter().enumerate() {
             set.push_along(i, *side);
         }
         reach[..n].copy_from_slice(&most[..n]);
+        self.widest.iter_mut().zip(&most).for_each(|(widest, most)| *widest = widest.max(*most));
+        let answers: Vec<f64> = (0..m).map(|i| answer(i, &others, moved, &arrives)).collect();
         if self.delay > 0.0 {
             self.predict(model, piece, &most, residual);
         }
-        all_finite(&sides) && all_finite(&self.set.centre)
+        if self.latest > 0.0 {
+            self.note(u, &answers, (dt, held))?;
+        }
+        if all_finite(&sides) && all_finite(&self.set.centre) { Ok(()) } else { Err(Failure::Spreads) }
+    }
+
+    /// Remembers by how much `answers` of the last piece, which lasted `dt` s, may differ, and checks the inputs `u` again.
+    fn note(&mut self, u: &[f64], answers: &[f64], (dt, held): (f64, f64)) -> Result<(), Failure> {
+        for (i, answer) in answers.iter().enumerate() {
+            let remains = self.of.remains(i, dt, held)[1];
+            self.lates[i] *= remains;
+            let [now, ..] = &mut self.differs;
+            now[i] = now[i].max(answer * (1.0 + ROUND_OFF));
+            // What arrives of them later is a mean of earlier ones.
+            self.arrives[i] = now[i].max(self.arrives[i] * remains);
+        }
+        let others: Vec<f64> =
+            self.noise.iter().zip(self.differs[0]).map(|(noise, now)| noise + now).collect();
+        self.is_bounded(u, &others)
     }
 
     /// Bounds how far the state predicted over the delay may be from the true one, on `piece`, on which deviations are up to
@@ -562,7 +708,7 @@ impl<'a> Tube<'a> {
         residual: impl Fn(usize) -> f64,
     ) {
         let ([n, m], kept) = (self.dims, self.dims[0] + self.late);
-        let Self { of, delay, next_unseen, plant, rooms, late, noise, reach, .. } = self;
+        let Self { of, delay, next_unseen, plant, rooms, lates, noise, reach, differs, .. } = self;
         let Rooms { variables, rates, at: here, slopes, .. } = rooms;
         let evaluate = |variables: &[Second], out: &mut [Second]| {
             let (x, u) = variables.split_at(n);
@@ -571,10 +717,12 @@ impl<'a> Tube<'a> {
         // The prediction knows what was asked, not what arrived of it.
         let lost = |j: usize| {
             let [least, largest] = of.gains[j];
-            let late = if *late > 0 { reach[n + j] } else { 0.0 };
-            let asked = reach[kept + j] + noise[j];
-            largest.max(1.0) * (2.0 * noise[j] + late)
-                + (1.0 - least).abs().max((largest - 1.0).abs()) * (piece.u[j].abs() + asked)
+            let (late, apart) =
+                (lates[j], noise[j] + differs.iter().map(|differs| differs[j]).fold(0.0, f64::max));
+            let unknown = if of.lags[j][1] > 0.0 { 2.0 * apart + late } else { 0.0 };
+            largest.max(1.0) * unknown
+                + (1.0 - least).abs().max((largest - 1.0).abs())
+                    * (piece.u[j].abs() + reach[kept + j] + apart + late)
         };
         // What earlier pieces of the hold left goes on, and the prediction itself is resolved as a reference is.
         let begin: Vec<f64> =
@@ -622,6 +770,7 @@ struct Arrives {
     spread: f64,
     changes: f64,
     most: f64,
+    apart: f64,
 }
 
 /// The middle of two numbers, and half of what lies between them, rounded up.

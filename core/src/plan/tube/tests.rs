@@ -139,12 +139,14 @@ impl<P: ControlAffine<4, 2>> Beside<'_, P> {
     }
 }
 
+/// The parts of a hold in which a disturbance is constant, and before which a sample may come.
+const SLICES: u32 = 10;
 /// The error of the judge's own integration.
 const INTEGRATED: f64 = 1e-6;
 
 /// Follows a curved reference under a constant gain, with `runs` plants beside it. Returns how many left the tube, in a
 /// direction or by h, at a sample or between.
-fn escapes<P>(plant: &P, gain: &[f64], worse: f64, runs: usize) -> usize
+fn escapes<P>(plant: &P, gain: &[f64], worse: f64, runs: usize, (dt, jitter): (f64, f64)) -> usize
 where
     P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
 {
@@ -154,7 +156,8 @@ where
         rates: vec![0.02, 0.01, 0.02, 0.1],
         errors: vec![0.02, 0.02, 0.01, 0.02],
         gains: vec![[0.9, 1.05], [0.95, 1.1]],
-        lags: vec![[0.01, 0.06], [0.0, 0.04]],
+        lags: if jitter > 0.0 { vec![[0.0; 2]; 2] } else { vec![[0.01, 0.06], [0.0, 0.04]] },
+        jitter,
     };
     let bounds = Bounds { min: [-9.0; MAX_INPUTS], max: [9.0; MAX_INPUTS] };
     let requirement = Requirement {
@@ -167,7 +170,8 @@ where
         firm: 0.0,
         reserve: 0.0,
     };
-    let tube = Tube::around(model, (&of, 0.0), &bounds, [4, 2], &[requirement]).expect("derivatives");
+    let tube =
+        Tube::around(model, (&of, [0.0, 0.5 * dt]), &bounds, [4, 2], &[requirement]).expect("derivatives");
     let mut tube = tube.acted_on(&[[-0.2, 0.3], [0.0, 0.4]]);
     let mut draws = Draws(11);
     let mut z = [0.0, 0.0, 0.3, 1.0];
@@ -179,31 +183,45 @@ where
         late.push([0.05 + world.draw(&mut draws, 0.25), 0.2 + world.draw(&mut draws, 0.2)]);
     }
     let mut left = vec![false; runs];
-    for k in 0..100 {
+    let mut inputs = vec![[0.0; 2]; runs];
+    // When each was sampled last, in slices, and in which hold.
+    let mut sampled = vec![(0.0, None); runs];
+    // The same gain for all headings does not last.
+    for k in 0..(3.0 / dt) as u32 {
         let v = [0.5 * (0.1 * f64::from(k)).sin(), 0.4 * (0.07 * f64::from(k)).cos()];
-        tube.hold(&v, &z, Some(gain)).expect("within bounds");
-        let inputs: Vec<[f64; 2]> = (worlds.iter().zip(&beside))
-            .map(|(world, x)| {
-                let seen: [f64; 4] =
-                    core::array::from_fn(|i| x[i] + world.draw(&mut draws, of.errors[i]) - z[i]);
-                core::array::from_fn(|i| v[i] + zonotope::dot(&gain[4 * i..4 * i + 4], &seen))
-            })
-            .collect();
+        let gain = Some(gain).filter(|_| k > 0 || jitter == 0.0);
+        tube.hold(&v, &z, gain).expect("within bounds");
         let (mut path, mut over) = (vec![[0.0; EXPANSION_ORDERS]; 4], Vec::new());
         model.path(&z, &v, &mut path);
-        let dt = 0.02;
         over.extend(path.iter().map(|c| expansion::over(c, dt)));
-        assert!(tube.advance(model, Piece { path: &path, over: &over, dt, u: &v }, |_| 1e-10));
+        tube.advance(model, Piece { path: &path, over: &over, dt, u: &v }, |_| 1e-10).expect("a bound");
         let [fall, _] = tube.fall((0, &requirement), Interval::from(0.0), &over);
-        for step in 1..=2 {
-            let at_end = step == 2;
-            let reference: [f64; 4] = core::array::from_fn(|i| at(&path[i], dt / 2.0 * f64::from(step)));
+        for slice in 0..SLICES {
+            let reference = |slice: u32| -> [f64; 4] {
+                core::array::from_fn(|i| at(&path[i], dt / f64::from(SLICES) * f64::from(slice)))
+            };
+            let (before, reference) = (reference(slice), reference(slice + 1));
             let runs = worlds.iter().zip(beside.iter_mut().zip(&mut late));
-            for ((world, (x, late)), (u, left)) in runs.zip(inputs.iter().zip(&mut left)) {
-                world.run(&mut draws, x, late, *u, dt / 2.0);
+            let asked = inputs.iter_mut().zip(&mut sampled).zip(&mut left);
+            for ((world, (x, late)), ((input, since), left)) in runs.zip(asked) {
+                // A sample here, which has to come if the next one would be too late. The first of a hold counts.
+                let is_last =
+                    f64::from(k * SLICES + slice + 1) - since.0 > 0.5 * (1.0 + jitter) * f64::from(SLICES);
+                let comes = if jitter > 0.0 && k > 0 { is_last || draws.part() < 0.1 } else { slice == 0 };
+                if comes {
+                    let is_first = since.1 != Some(k);
+                    *since = (f64::from(k * SLICES + slice), Some(k));
+                    if is_first {
+                        let seen: [f64; 4] =
+                            core::array::from_fn(|i| x[i] + world.draw(&mut draws, of.errors[i]) - before[i]);
+                        let gain = |i: usize| gain.map_or(&[][..], |gain| &gain[4 * i..4 * i + 4]);
+                        *input = core::array::from_fn(|i| v[i] + zonotope::dot(gain(i), &seen));
+                    }
+                }
+                world.run(&mut draws, x, late, *input, dt / f64::from(SLICES));
                 *left |= model.value(0.0, x) < model.value(0.0, &reference) - fall;
                 let e: [f64; 4] = core::array::from_fn(|i| x[i] - reference[i]);
-                for _ in 0..if at_end { 20 } else { 0 } {
+                for _ in 0..if slice + 1 == SLICES { 20 } else { 0 } {
                     let direction: Vec<f64> = (0..4).map(|_| draws.signed()).collect();
                     let (along, centre) =
                         (zonotope::dot(&direction, &e), zonotope::dot(&direction, &tube.set.centre));
@@ -222,17 +240,20 @@ const FOLLOWS: [f64; 8] = [-1.2, -0.4, 0.0, -1.8, 0.4, -1.2, -2.2, 0.0];
 
 #[test]
 fn no_plant_within_what_was_declared_leaves_its_tube() {
-    assert_eq!(escapes(&Unicycle, &FOLLOWS, 1.0, 60), 0);
-    assert_eq!(escapes(&Bicycle::new(2.5).expect("a length"), &FOLLOWS, 1.0, 60), 0);
-    let point = [-1.5, 0.0, -2.0, 0.0, 0.0, -1.5, 0.0, -2.0];
-    assert_eq!(escapes(&PointMass, &point, 1.0, 60), 0);
+    // Frequent samples, rare ones, and frequent ones that come late.
+    for how in [(0.02, 0.0), (0.1, 0.0), (0.04, 0.3)] {
+        assert_eq!(escapes(&Unicycle, &FOLLOWS, 1.0, 60, how), 0);
+        assert_eq!(escapes(&Bicycle::new(2.5).expect("a length"), &FOLLOWS, 1.0, 60, how), 0);
+        let point = [-1.5, 0.0, -2.0, 0.0, 0.0, -1.5, 0.0, -2.0];
+        assert_eq!(escapes(&PointMass, &point, 1.0, 60, how), 0);
+    }
 }
 
 /// The judge can fail: plants that are much worse than declared leave.
 #[test]
 fn plants_beyond_what_was_declared_leave_their_tube() {
-    assert!(escapes(&Unicycle, &FOLLOWS, 8.0, 60) > 30);
-    assert!(escapes(&PointMass, &[-1.5, 0.0, -2.0, 0.0, 0.0, -1.5, 0.0, -2.0], 8.0, 60) > 30);
+    assert!(escapes(&Unicycle, &FOLLOWS, 8.0, 60, (0.02, 0.0)) > 30);
+    assert!(escapes(&PointMass, &[-1.5, 0.0, -2.0, 0.0, 0.0, -1.5, 0.0, -2.0], 8.0, 60, (0.02, 0.0)) > 30);
 }
 
 /// A cart that is pushed: (position, speed).
@@ -267,9 +288,10 @@ fn no_disturbance_of_a_linear_cart_leads_out_of_its_tube() {
             errors: vec![0.0; 2],
             gains: vec![[1.0; 2]],
             lags: vec![[lag; 2]],
+            jitter: 0.0,
         };
         let bounds = Bounds { min: [-1e9; MAX_INPUTS], max: [1e9; MAX_INPUTS] };
-        let tube = Tube::around(model, (&of, 0.0), &bounds, [2, 1], &[]).expect("derivatives");
+        let tube = Tube::around(model, (&of, [0.0, dt]), &bounds, [2, 1], &[]).expect("derivatives");
         let (mut tube, gain) = (tube.acted_on(&[[0.0; 2]]), [-k0, -k1]);
         // Position, speed and what arrives, after a disturbance of its own for a part of a hold; and what is asked.
         let mut responses: Vec<([f64; 3], f64)> = Vec::new();
@@ -295,7 +317,8 @@ fn no_disturbance_of_a_linear_cart_leads_out_of_its_tube() {
             let (mut path, mut over) = (vec![[0.0; EXPANSION_ORDERS]; 2], Vec::new());
             model.path(&[0.0; 2], &[0.0], &mut path);
             over.extend(path.iter().map(|c| expansion::over(c, dt)));
-            assert!(tube.advance(model, Piece { path: &path, over: &over, dt, u: &[0.0] }, |_| 0.0));
+            let piece = Piece { path: &path, over: &over, dt, u: &[0.0] };
+            tube.advance(model, piece, |_| 0.0).expect("a bound");
             let mut reach = [0.0; 4];
             tube.set.reach(&mut reach);
             let reach = reach.map(|reach| reach.max(1e-9));

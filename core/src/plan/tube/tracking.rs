@@ -24,7 +24,7 @@ pub struct Tracking {
     pub(in crate::plan) states: Vec<Vec<f64>>,
     /// The gain at every sample, by input and state; empty where the input is held as it is.
     pub(in crate::plan) gains: Vec<Vec<f64>>,
-    /// How far each measured state may be from the reference there.
+    /// How far each measured state may be from the reference there; anywhere in the hold, if samples may be late.
     pub(in crate::plan) radii: Vec<Vec<f64>>,
 }
 
@@ -49,7 +49,7 @@ impl Tracking {
         &self.gains
     }
 
-    /// How far each measured state may be from the reference at every sample.
+    /// How far each measured state may be from the reference at every sample, or during its hold if samples may be late.
     pub fn radii(&self) -> &[Vec<f64>] {
         &self.radii
     }
@@ -58,6 +58,12 @@ impl Tracking {
     pub(in crate::plan) fn at(&self, t: f64, slack: f64) -> Option<usize> {
         let k = self.times.partition_point(|time| *time < t - slack);
         (k < self.inputs.len() && (self.times[k] - t).abs() <= slack).then_some(k)
+    }
+
+    /// The number of the hold at `t`, within `slack` s.
+    pub(in crate::plan) fn during(&self, t: f64, slack: f64) -> Option<usize> {
+        let k = self.times.partition_point(|time| *time <= t + slack).checked_sub(1)?;
+        (k < self.inputs.len()).then_some(k)
     }
 
     /// The length in s of its longest hold.
@@ -93,20 +99,20 @@ impl Tracking {
             && are_gains
     }
 
-    /// Writes the input at sample `k` for the measured state `x`.
-    pub(in crate::plan) fn input(&self, k: usize, x: &[f64], u: &mut [f64]) {
+    /// Writes the input in hold `k` for the measured state `x`, where the reference is `z`.
+    pub(in crate::plan) fn input(&self, (k, z): (usize, &[f64]), x: &[f64], u: &mut [f64]) {
         u.copy_from_slice(&self.inputs[k]);
-        let (z, n) = (&self.states[k], x.len());
+        let n = x.len();
         for (u, gain) in u.iter_mut().zip(self.gains[k].chunks_exact(n)) {
             *u += gain.iter().zip(x.iter().zip(z)).map(|(gain, (x, z))| gain * (x - z)).sum::<f64>();
         }
     }
 
-    /// The state that is farther from the reference at sample `k` than is possible, if there is one, and by how much.
-    pub(in crate::plan) fn escaped(&self, k: usize, x: &[f64]) -> Option<(usize, f64)> {
+    /// The state that is farther from the reference `z` in hold `k` than is possible, if there is one, and by how much.
+    pub(in crate::plan) fn escaped(&self, (k, z): (usize, &[f64]), x: &[f64]) -> Option<(usize, f64)> {
         let beyond = |i: usize| {
             let round_off = 1e-9 * (1.0 + x[i].abs());
-            (x[i] - self.states[k][i]).abs() - self.radii[k][i] - round_off
+            (x[i] - z[i]).abs() - self.radii[k][i] - round_off
         };
         // NaN has escaped.
         (0..x.len()).map(|i| (i, beyond(i))).find(|(_, beyond)| *beyond > 0.0 || beyond.is_nan())
