@@ -14,10 +14,11 @@ pub const CODES: [(u8, &str); 4] = [
 
 /// What [`FOUND`] means for each command, in the order of `--help`. Commands that never end with it are not
 /// listed.
-pub const FOUND_BY: [(&str, &str); 13] = [
+pub const FOUND_BY: [(&str, &str); 14] = [
     ("new", ""),
     ("build", "the FMU that was made does not work"),
     ("check", "from the start, a promise is not guaranteed, or the closed loop does not keep it"),
+    ("identify", "the FMU failed, or what is proposed does not explain every hold"),
     ("demo", "our method missed a deadline or left the disc"),
     ("reproduce", "our method missed a deadline or left the disc"),
     ("run", "a promise was not kept, guaranteed or refused (see --require); or an FMU failed"),

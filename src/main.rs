@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use punctual::codes;
 use punctual::command::{
-    build, campaign, check, demo, inspect, merge, new, replay, reproduce, run, shell, validate,
+    build, campaign, check, demo, identify, inspect, merge, new, replay, reproduce, run, shell, validate,
 };
 use punctual::output;
 use punctual_cosim::error::Details;
@@ -33,6 +33,8 @@ enum Command {
     Build(build::Arguments),
     /// Check a configuration before it is built: relative degree, rates, guarantee from a start, warnings
     Check(check::Arguments),
+    /// Find out from a recording or an FMU how the plant differs from the model, and what to declare
+    Identify(identify::Arguments),
     /// Bring three vehicles into a disc by a deadline, with the paper's method and with ours; then with bounds, past a rock
     Demo(demo::Arguments),
     /// Compare the paper's tables and figures with ours and with other methods; write CSV, SVG and a page
@@ -96,6 +98,7 @@ fn main() -> ExitCode {
         Command::Build(arguments) => build::execute(&arguments),
         Command::Campaign(arguments) => campaign::execute(&arguments),
         Command::Check(arguments) => check::execute(&arguments),
+        Command::Identify(arguments) => identify::execute(&arguments),
         Command::Demo(arguments) => demo::execute(&arguments),
         Command::Reproduce(arguments) => reproduce::execute(&arguments),
         Command::New(arguments) => new::execute(&arguments),

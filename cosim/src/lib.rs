@@ -15,6 +15,7 @@
 //! validate             the defects of an FMU: archive, schema, rules, symbols, a trial
 //! coupling             several FMUs: system file, order, fixed-step master
 //! package              from a configuration to an .fmu file, from a system to an .ssp file, FMUs merged
+//! identification       how a plant differs from its model, found in recordings
 //! campaign             many runs from drawn starts and parameters, in process; Parquet
 //! ```
 #![deny(unsafe_code)]
@@ -27,6 +28,7 @@ pub mod error;
 pub mod exit;
 #[expect(unsafe_code, reason = "FMUs are shared libraries called through C")]
 pub mod host;
+pub mod identification;
 pub mod isolation;
 pub mod package;
 pub mod recording;

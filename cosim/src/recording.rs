@@ -1,5 +1,7 @@
 //! The recording of a run: a table of doubles with named columns, and its CSV form.
 
+mod reader;
+
 use std::io::{self, Write};
 use std::path::Path;
 

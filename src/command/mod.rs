@@ -6,6 +6,7 @@ pub mod campaign;
 pub mod check;
 mod closed_loop;
 pub mod demo;
+pub mod identify;
 pub mod inspect;
 mod map;
 pub mod merge;

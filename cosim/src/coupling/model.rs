@@ -66,7 +66,7 @@ impl Model {
     /// # Errors
     ///
     /// A file that is missing or cannot be used.
-    pub(super) fn open(path: &Path, shared: &[Self], read: Reader) -> Result<Self, Error> {
+    pub(crate) fn open(path: &Path, shared: &[Self], read: Reader) -> Result<Self, Error> {
         if text::is_toml(path) {
             let own = Own::new(read(path)?)?;
             return Ok(Self::Own(Box::new(own), path.to_owned()));
@@ -135,7 +135,7 @@ impl Model {
     }
 
     /// An instance called `name`.
-    pub(super) fn instance(&self, name: &str) -> Result<Box<dyn Participant>, Error> {
+    pub(crate) fn instance(&self, name: &str) -> Result<Box<dyn Participant>, Error> {
         Ok(match self {
             Self::Fmu(fmu, description) => fmu.instantiate(description, name)?,
             Self::Own(own, _) => Box::new(own.instance(name)?),
