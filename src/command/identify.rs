@@ -3,12 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use punctual_core::filter::AssuranceStatus;
+use punctual_cosim::coupling::{Component, Model, Outcome, System};
 use punctual_cosim::error::Error;
 use punctual_cosim::identification::{self, Finding, Kind, Named, Proposal, Record};
 use punctual_cosim::package;
 use punctual_cosim::recording::Recording;
 use punctual_cosim::{text, whole};
-use punctual_fmu::configuration::{Configuration, FilterConfiguration};
+use punctual_fmu::configuration::{Configuration, FilterConfiguration, RESOURCE, VariableSection};
 use serde::Serialize;
 
 use crate::codes;
@@ -184,7 +186,8 @@ fn line(finding: &Finding, proposal: &Proposal) -> String {
         parts.push(unit.to_owned());
     }
     let found = |[least, most]: [f64; 2]| {
-        if finding.is_interval() { format!("{} to {}", number(least), number(most)) } else { number(most) }
+        let ends = [least, most].map(number);
+        if ends[0] == ends[1] { number(most) } else { ends.join(" to ") }
     };
     let of = match finding.instant {
         Some([time, length]) if length > 1.5 * proposal.period => {
@@ -228,7 +231,7 @@ fn verdict(proposal: &Proposal) -> String {
         return sentences.join(" ");
     }
     if let Some(alone) = proposal.difference.sentence() {
-        sentences.push(format!("Alone, {alone} of the difference."));
+        sentences.push(format!("Alone, {alone}."));
     }
     if let Some(delay) = proposal.long_delay {
         sentences.push(format!(
@@ -281,6 +284,52 @@ fn warnings(proposal: &Proposal, filter: &FilterConfiguration) -> Vec<String> {
         }
     }
     warnings
+}
+
+/// What the user should know where a filter of a run lost its guarantee: what the difference between plant and model looks like. The
+/// table of the run is in `csv`, if it was written.
+pub(super) fn lost(system: &System, models: &[Model], outcome: &Outcome, csv: Option<&Path>) -> Vec<String> {
+    // Other rows miss inputs.
+    if system.record().every != 1 {
+        return Vec::new();
+    }
+    let components = system.components().iter().zip(models);
+    let note = |(component, model): (&Component, &Model)| {
+        let name = &component.name;
+        let status = outcome.recording.series(&format!("{name}.assurance"))?;
+        let code = f64::from(AssuranceStatus::Lost as u8);
+        let filter = status.contains(&code).then(|| filter(model)).flatten()?;
+        let of = |kind: &'static str| {
+            move |s: VariableSection| Named {
+                column: format!("{name}.{kind}.{}", s.name),
+                signal: s.name,
+            }
+        };
+        let named = filter.plant.states().into_iter().map(of("x")).chain(filter.plant.inputs().into_iter().map(of("u")));
+        let named: Vec<_> = named.collect();
+        // What cannot be compared is no fault of the run.
+        let record = Record::of(&filter, std::slice::from_ref(&outcome.recording), &named).ok()?;
+        let sentence = identification::difference(&filter, &record).ok()?.sentence()?;
+        let file = if text::is_toml(model.path()) { model.path().display().to_string() } else { "FILTER.toml".to_owned() };
+        let what = match csv {
+            Some(csv) => format!("`punctual identify {file} {}` says what to declare", csv.display()),
+            None => format!("run it with --out, and `punctual identify {file} RUN.csv` says what to declare"),
+        };
+        Some(format!("{name}: the plant is not the model: {sentence}; {what}"))
+    };
+    components.filter_map(note).collect()
+}
+
+/// The filter that a component is, if it has a model of the plant.
+fn filter(model: &Model) -> Option<FilterConfiguration> {
+    let own = match model {
+        Model::Own(own, _) => own.configuration.clone(),
+        Model::Fmu(fmu, _) => Configuration::parse(&fmu.resource(RESOURCE)?).ok()?,
+    };
+    match own {
+        Configuration::Filter(filter) if filter.integrator.is_none() && filter.external().is_none() => Some(filter),
+        _ => None,
+    }
 }
 
 /// Writes the filter's file with the `lines` below its kind.

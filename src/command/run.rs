@@ -23,7 +23,7 @@ use punctual_pictures::drawing::{self, Drawing};
 use punctual_pictures::report;
 use serde::Serialize;
 
-use super::check;
+use super::{check, identify};
 use crate::codes;
 use crate::output::{self, Progress, number};
 
@@ -268,6 +268,8 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
         let is_refused = is_refused(&outcome.recording);
         notes.extend(check::notes_before_run(&filter, is_refused).map_err(|e| e.in_file(path))?);
     }
+    let csv = out.as_ref().map(|folder| csv_file(path, folder));
+    notes.extend(identify::lost(&system, &models, &outcome, csv.as_deref()));
     let notes = output::grouped(notes);
     let mut files = Vec::new();
     if let Some(folder) = &out {

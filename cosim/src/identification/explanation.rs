@@ -113,8 +113,8 @@ impl Difference {
             .map(|e| format!("{} would explain {} %", e.cause.words(), (100.0 * e.share).floor()))
             .collect();
         self.is_seen().then(|| match &named[..] {
-            [] => "no single lag, gain, delay, constant rate or parameter explains much of it".to_owned(),
-            named => named.join(", "),
+            [] => "no lag, gain, delay, constant rate or parameter explains much of the difference".to_owned(),
+            named => format!("{} of the difference", named.join(", ")),
         })
     }
 }
