@@ -75,18 +75,21 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let filter = match super::read(file)? {
         Configuration::Filter(filter) => filter,
         other => {
-            let message = format!("is {:?}, must be \"filter\": its model is compared with the plant", other.kind());
+            let message =
+                format!("is {:?}, must be \"filter\": its model is compared with the plant", other.kind());
             return Err(Error::configuration("kind", message).in_file(file));
         }
     };
     check(arguments, &filter)?;
+    identification::check(&filter).map_err(|e| e.in_file(file))?;
     let named = arguments.column.iter().map(|text| Named::parse(text)).collect::<Result<Vec<_>, _>>()?;
     let record = record(arguments, &filter, &named)?;
     if let Some(path) = &arguments.record {
         record.recording().save_csv(path, true)?;
         output::note(&format!("note: the recording is in {}", path.display()));
     }
-    let proposal = identification::identify(&filter, &record, arguments.factor).map_err(|e| e.in_file(file))?;
+    let proposal =
+        identification::identify(&filter, &record, arguments.factor).map_err(|e| e.in_file(file))?;
     let lines: Vec<String> = proposal.findings.iter().map(|finding| line(finding, &proposal)).collect();
     if let Some(path) = &arguments.write {
         write(file, path, &filter, &lines)?;
@@ -114,7 +117,11 @@ fn check(arguments: &Arguments, filter: &FilterConfiguration) -> Result<(), Erro
         Err(Error::configuration(field, format!("is {value}, must be {allowed}")))
     };
     if !(1.0..=100.0).contains(&arguments.factor) {
-        return refuse("--factor", arguments.factor, "1 to 100: 1 declares what the recording shows, and no more");
+        return refuse(
+            "--factor",
+            arguments.factor,
+            "1 to 100: 1 declares what the recording shows, and no more",
+        );
     }
     if !arguments.duration.is_finite() || arguments.duration <= 0.0 {
         return refuse("--duration", arguments.duration, "finite and > 0 (s)");
@@ -136,8 +143,9 @@ fn check(arguments: &Arguments, filter: &FilterConfiguration) -> Result<(), Erro
         None => Ok(()),
         Some((key, _)) => {
             let file = arguments.filter.display();
-            let message =
-                format!("{file} has `{key}` already, and nothing is written over it; remove it, or paste the lines yourself");
+            let message = format!(
+                "{file} has `{key}` already, and nothing is written over it; remove it, or paste the lines yourself"
+            );
             Err(Error::configuration("--write", message))
         }
     }
@@ -173,7 +181,9 @@ fn record(arguments: &Arguments, filter: &FilterConfiguration, named: &[Named]) 
     let excited = identification::excite(filter, path, named, times, package::read_configuration)?;
     for (state, count) in &excited.ended {
         let times = if *count == 1 { "once".to_owned() } else { format!("{count} times") };
-        output::note(&format!("note: {state} left its range {times}; the plant began anew from its start then"));
+        output::note(&format!(
+            "note: {state} left its range {times}; the plant began anew from its start then"
+        ));
     }
     Ok(excited.record)
 }
@@ -223,7 +233,10 @@ fn verdict(proposal: &Proposal) -> String {
         quantity(proposal.duration, "s")
     ));
     if proposal.findings.is_empty() {
-        let finest = proposal.resolution.iter().map(|(state, size, unit)| format!("{state} {}", quantity(*size, unit)));
+        let finest = proposal
+            .resolution
+            .iter()
+            .map(|(state, size, unit)| format!("{state} {}", quantity(*size, unit)));
         sentences.push(format!(
             "The plant is the model, as far as this shows: no rate is off by more than {}.",
             finest.collect::<Vec<_>>().join(", ")
@@ -245,14 +258,20 @@ fn verdict(proposal: &Proposal) -> String {
     } else {
         format!("Together the lines explain {} of {} holds.", proposal.explained, proposal.holds)
     });
+    let ranges = proposal.ranges.iter().map(|(state, [least, most], unit)| {
+        format!("{state} {} to {}", number(*least), quantity(*most, unit))
+    });
+    sentences.push(format!(
+        "A recording shows what was, less than what may be, and nothing beyond {}:",
+        ranges.collect::<Vec<_>>().join(", ")
+    ));
     sentences.push(if proposal.factor > 1.0 {
         format!(
-            "A recording shows what was, and less than what may be: so {} times what was found is declared. That is a guess, and \
-             more recordings are better.",
+            "so {} times what was found is declared (--factor). That is a guess; recordings of what the plant is to do are better.",
             number(proposal.factor)
         )
     } else {
-        "A recording shows what was, and less than what may be: this declares what was found, and no more.".to_owned()
+        "this declares what was found, and no more (--factor).".to_owned()
     });
     sentences.join(" ")
 }
@@ -280,7 +299,10 @@ fn warnings(proposal: &Proposal, filter: &FilterConfiguration) -> Vec<String> {
     if !filter.is_assured() {
         let declares = |finding: &Finding| !matches!(finding.kind, Kind::Delay | Kind::Error);
         if proposal.findings.iter().any(declares) {
-            warnings.push(format!("only plans account for `uncertainty`, and none are followed: {}", filter.unassured()));
+            warnings.push(format!(
+                "only plans account for `uncertainty`, and none are followed: {}",
+                filter.unassured()
+            ));
         }
     }
     warnings
@@ -300,17 +322,23 @@ pub(super) fn lost(system: &System, models: &[Model], outcome: &Outcome, csv: Op
         let code = f64::from(AssuranceStatus::Lost as u8);
         let filter = status.contains(&code).then(|| filter(model)).flatten()?;
         let of = |kind: &'static str| {
-            move |s: VariableSection| Named {
-                column: format!("{name}.{kind}.{}", s.name),
-                signal: s.name,
-            }
+            move |s: VariableSection| Named { column: format!("{name}.{kind}.{}", s.name), signal: s.name }
         };
-        let named = filter.plant.states().into_iter().map(of("x")).chain(filter.plant.inputs().into_iter().map(of("u")));
+        let named = filter
+            .plant
+            .states()
+            .into_iter()
+            .map(of("x"))
+            .chain(filter.plant.inputs().into_iter().map(of("u")));
         let named: Vec<_> = named.collect();
         // What cannot be compared is no fault of the run.
-        let record = Record::of(&filter, std::slice::from_ref(&outcome.recording), &named).ok()?;
+        let record = Record::of(&filter, &[first_rows(&outcome.recording)], &named).ok()?;
         let sentence = identification::difference(&filter, &record).ok()?.sentence()?;
-        let file = if text::is_toml(model.path()) { model.path().display().to_string() } else { "FILTER.toml".to_owned() };
+        let file = if text::is_toml(model.path()) {
+            model.path().display().to_string()
+        } else {
+            "FILTER.toml".to_owned()
+        };
         let what = match csv {
             Some(csv) => format!("`punctual identify {file} {}` says what to declare", csv.display()),
             None => format!("run it with --out, and `punctual identify {file} RUN.csv` says what to declare"),
@@ -320,6 +348,14 @@ pub(super) fn lost(system: &System, models: &[Model], outcome: &Outcome, csv: Op
     components.filter_map(note).collect()
 }
 
+/// As much of a recording as is compared within a second or two.
+fn first_rows(recording: &Recording) -> Recording {
+    const MOST: usize = 10_000;
+    let mut first = Recording::new(recording.columns().to_vec());
+    (0..recording.len().min(MOST)).for_each(|k| first.push(recording.times()[k], recording.row(k)));
+    first
+}
+
 /// The filter that a component is, if it has a model of the plant.
 fn filter(model: &Model) -> Option<FilterConfiguration> {
     let own = match model {
@@ -327,7 +363,9 @@ fn filter(model: &Model) -> Option<FilterConfiguration> {
         Model::Fmu(fmu, _) => Configuration::parse(&fmu.resource(RESOURCE)?).ok()?,
     };
     match own {
-        Configuration::Filter(filter) if filter.integrator.is_none() && filter.external().is_none() => Some(filter),
+        Configuration::Filter(filter) if filter.integrator.is_none() && filter.external().is_none() => {
+            Some(filter)
+        }
         _ => None,
     }
 }
@@ -335,7 +373,9 @@ fn filter(model: &Model) -> Option<FilterConfiguration> {
 /// Writes the filter's file with the `lines` below its kind.
 fn write(file: &Path, path: &Path, filter: &FilterConfiguration, lines: &[String]) -> Result<(), Error> {
     let own = text::read(file)?;
-    let is_kind = |line: &str| line.trim_start().strip_prefix("kind").is_some_and(|rest| rest.trim_start().starts_with('='));
+    let is_kind = |line: &str| {
+        line.trim_start().strip_prefix("kind").is_some_and(|rest| rest.trim_start().starts_with('='))
+    };
     let mut written = String::new();
     let mut done = false;
     for line in own.lines() {

@@ -19,6 +19,7 @@ fn help_of_every_command() {
         "check",
         "completions",
         "demo",
+        "identify",
         "inspect",
         "man",
         "merge",

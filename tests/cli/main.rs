@@ -17,6 +17,7 @@ mod fmi3;
 mod help;
 mod hostile;
 mod html;
+mod identifying;
 mod in_process;
 mod inspecting;
 mod judging;

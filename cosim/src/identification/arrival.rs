@@ -107,7 +107,13 @@ fn earlier(episode: &Episode, j: usize, before: Before) -> f64 {
 }
 
 /// The mean of a over each of the [`PARTS`] parts of each hold of `episode`, for input `j`.
-pub(super) fn means(episode: &Episode, j: usize, (delay, lag): (f64, f64), before: Before, parts: &Parts) -> Vec<f64> {
+pub(super) fn means(
+    episode: &Episode,
+    j: usize,
+    (delay, lag): (f64, f64),
+    before: Before,
+    parts: &Parts,
+) -> Vec<f64> {
     let all = episode.holds() * PARTS;
     let (mut integrals, mut lengths) = (vec![0.0; all], vec![0.0; all]);
     let mut a = earlier(episode, j, before);
@@ -121,16 +127,27 @@ pub(super) fn means(episode: &Episode, j: usize, (delay, lag): (f64, f64), befor
         }
         lengths[part] += length;
     }
-    integrals.iter().zip(&lengths).map(|(integral, length)| integral / length.max(f64::MIN_POSITIVE)).collect()
+    integrals
+        .iter()
+        .zip(&lengths)
+        .map(|(integral, length)| integral / length.max(f64::MIN_POSITIVE))
+        .collect()
 }
 
 /// An interval for each part of each hold that contains a, whatever was asked before the recording and however the time
 /// constant varies within `lag`.
-pub(super) fn enclosures(episode: &Episode, j: usize, delay: f64, lag: [f64; 2], parts: &Parts) -> Vec<[f64; 2]> {
+pub(super) fn enclosures(
+    episode: &Episode,
+    j: usize,
+    delay: f64,
+    lag: [f64; 2],
+    parts: &Parts,
+) -> Vec<[f64; 2]> {
     let both = [Before::Nothing, Before::First].map(|before| earlier(episode, j, before));
     let mut a = [both[0].min(both[1]), both[0].max(both[1])];
     // A delay hides which of both was asked.
-    let [nothing, first] = [Before::Nothing, Before::First].map(|before| pieces(episode, j, delay, before, parts));
+    let [nothing, first] =
+        [Before::Nothing, Before::First].map(|before| pieces(episode, j, delay, before, parts));
     let mut all = vec![[f64::INFINITY, f64::NEG_INFINITY]; episode.holds() * PARTS];
     for (one, other) in nothing.iter().zip(&first) {
         let asked = [one.asked.min(other.asked), one.asked.max(other.asked)];
@@ -191,7 +208,8 @@ mod tests {
         let within = enclosures(&recorded, 0, 0.03, [0.05, 0.15], &EQUAL);
         for lag in [0.05, 0.1, 0.15] {
             for before in [Before::Nothing, Before::First] {
-                for (mean, [min, max]) in means(&recorded, 0, (0.03, lag), before, &EQUAL).iter().zip(&within) {
+                for (mean, [min, max]) in means(&recorded, 0, (0.03, lag), before, &EQUAL).iter().zip(&within)
+                {
                     assert!((min - 1e-12..=max + 1e-12).contains(mean), "{lag}: {mean} in {min}..{max}");
                 }
             }

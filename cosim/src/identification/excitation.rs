@@ -105,10 +105,13 @@ pub fn excite(
                 plant.reset()?;
             }
             plant.setup_experiment(0.0, duration, None)?;
-            starts.iter().try_for_each(|(reference, value)| plant.set(DataType::Float64, &[*reference], &[*value]))?;
+            starts
+                .iter()
+                .try_for_each(|(reference, value)| plant.set(DataType::Float64, &[*reference], &[*value]))?;
             plant.enter_initialization_mode()?;
             let u = |k: usize| {
-                let value = |(j, bounds): (usize, &[f64; 2])| form.value(j, k, share, step, amplitude, *bounds);
+                let value =
+                    |(j, bounds): (usize, &[f64; 2])| form.value(j, k, share, step, amplitude, *bounds);
                 bounds.iter().enumerate().map(value).collect::<Vec<_>>()
             };
             write(&mut plant, &acting, &u(done))?;
@@ -291,7 +294,8 @@ impl Form {
 
 /// A number from 0 to 1 that depends only on `key` and `of`: one step of SplitMix64.
 fn uniform(key: u64, of: u64) -> f64 {
-    let mut z = key.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ of.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let mut z =
+        key.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ of.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64

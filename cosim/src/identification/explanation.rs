@@ -64,11 +64,15 @@ impl Cause {
     /// In words, such as "0.2 s of lag on a".
     pub fn words(&self) -> String {
         match self {
-            Self::Gain { input, gain } if *gain < 1.0 => format!("{} % less of {input}", number(100.0 * (1.0 - gain))),
+            Self::Gain { input, gain } if *gain < 1.0 => {
+                format!("{} % less of {input}", number(100.0 * (1.0 - gain)))
+            }
             Self::Gain { input, gain } => format!("{} % more of {input}", number(100.0 * (gain - 1.0))),
             Self::Lag { input, lag } => format!("{} s of lag on {input}", number(*lag)),
             Self::Delay { delay } => format!("{} s of delay", number(*delay)),
-            Self::Rate { state, rate, unit } => format!("{} added to the rate of {state}", quantity(*rate, unit)),
+            Self::Rate { state, rate, unit } => {
+                format!("{} added to the rate of {state}", quantity(*rate, unit))
+            }
             Self::Parameter { parameter, value, start, unit } => {
                 format!("{parameter} = {} in place of {}", number(*value), quantity(*start, unit))
             }
@@ -113,7 +117,9 @@ impl Difference {
             .map(|e| format!("{} would explain {} %", e.cause.words(), (100.0 * e.share).floor()))
             .collect();
         self.is_seen().then(|| match &named[..] {
-            [] => "no lag, gain, delay, constant rate or parameter explains much of the difference".to_owned(),
+            [] => {
+                "no lag, gain, delay, constant rate or parameter explains much of the difference".to_owned()
+            }
             named => format!("{} of the difference", named.join(", ")),
         })
     }
@@ -205,7 +211,9 @@ impl<'a> Seen<'a> {
                 let mut left = this.left.clone();
                 for j in which {
                     let late = this.effect(*j, delay, lag, before);
-                    left.iter_mut().zip(at_once[*j].iter().zip(late)).for_each(|(l, (now, late))| *l += now - late);
+                    left.iter_mut()
+                        .zip(at_once[*j].iter().zip(late))
+                        .for_each(|(l, (now, late))| *l += now - late);
                 }
                 1.0 - this.product(&left, &left) / this.total.max(f64::MIN_POSITIVE)
             };
@@ -315,7 +323,9 @@ fn parameters(c: &FilterConfiguration, record: &Record, seen: &Seen<'_>) -> Resu
         let mut value = start;
         let mut best = (start, 0.0);
         for _ in 0..ROUNDS {
-            let (Some(left), Some(moved)) = (predicted(value, row)?, predicted(value + change, row)?) else { break };
+            let (Some(left), Some(moved)) = (predicted(value, row)?, predicted(value + change, row)?) else {
+                break;
+            };
             let share = 1.0 - seen.product(&left, &left) / seen.total.max(f64::MIN_POSITIVE);
             if share > best.1 {
                 best = (value, share);

@@ -72,7 +72,8 @@ impl<'a> Fitting<'a> {
     ) -> Result<Self, Error> {
         let linear = Linear::new(model, record, arrival)?;
         let scales = scales(record);
-        let mut fitting = Self { record, linear, scales, window: 1, base: Vec::new(), columns: BTreeMap::new() };
+        let mut fitting =
+            Self { record, linear, scales, window: 1, base: Vec::new(), columns: BTreeMap::new() };
         fitting.window = window.unwrap_or_else(|| fitting.best_window());
         let (n, m) = (fitting.linear.states, fitting.linear.inputs);
         let effects = fitting.linear.effects(&fitting.linear.arriving);
@@ -122,7 +123,8 @@ impl<'a> Fitting<'a> {
     /// What input `j` does by itself behind a delay and a lag, by hold and state.
     pub(super) fn effect(&self, j: usize, delay: f64, lag: f64, before: Before) -> Vec<f64> {
         let (n, m) = (self.linear.states, self.linear.inputs);
-        let series = self.record.episodes.iter().flat_map(|e| means(e, j, (delay, lag), before, &self.linear.parts));
+        let series =
+            self.record.episodes.iter().flat_map(|e| means(e, j, (delay, lag), before, &self.linear.parts));
         let mut effect = vec![0.0; self.linear.holds.len() * n];
         for (at, mean) in series.enumerate() {
             let (k, s) = (at / PARTS, at % PARTS);
@@ -180,7 +182,8 @@ impl<'a> Fitting<'a> {
         let squares = |gains: &[f64]| {
             let mut squares = vec![0.0; n];
             for (at, base) in rest.iter().enumerate() {
-                let left = base - columns.iter().zip(gains).map(|(column, gain)| gain * column[at]).sum::<f64>();
+                let left =
+                    base - columns.iter().zip(gains).map(|(column, gain)| gain * column[at]).sum::<f64>();
                 squares[at % n] += left * left;
             }
             squares
@@ -215,8 +218,10 @@ impl<'a> Fitting<'a> {
             open.iter().zip(solved.iter()).for_each(|(j, gain)| gains[*j] = *gain);
             found = squares(&gains);
         }
-        let cost =
-            found.iter().zip(&floors).map(|(s, floor)| punctual_core::elementary::ln(s / windows as f64 + floor));
+        let cost = found
+            .iter()
+            .zip(&floors)
+            .map(|(s, floor)| punctual_core::elementary::ln(s / windows as f64 + floor));
         Explained { cost: cost.sum(), arrival: Arrival { gains, ..arrival.clone() }, squares: found }
     }
 }
@@ -295,7 +300,9 @@ impl Fitting<'_> {
             if by <= sought.lag && by > 0.0 {
                 starts.push(Arrival { lags: vec![by; m], ..Arrival::nominal(m) });
                 let of_one = |j: usize| (0..m).map(|i| if i == j { by } else { 0.0 }).collect();
-                starts.extend((0..m).filter(|_| m > 1).map(|j| Arrival { lags: of_one(j), ..Arrival::nominal(m) }));
+                starts.extend(
+                    (0..m).filter(|_| m > 1).map(|j| Arrival { lags: of_one(j), ..Arrival::nominal(m) }),
+                );
             }
         }
         let both = |start: &Arrival| {
@@ -307,7 +314,8 @@ impl Fitting<'_> {
         // Beginnings of different kinds lead to different valleys.
         const STARTS: usize = 3;
         let active = Active { delay: sought.delay > 0.0, lags: vec![sought.lag > 0.0; m], gains: all };
-        let refined = found.into_iter().take(STARTS).map(|f| self.searched(&f.arrival, &active, sought, period));
+        let refined =
+            found.into_iter().take(STARTS).map(|f| self.searched(&f.arrival, &active, sought, period));
         let refined: Vec<_> = refined.collect();
         let best = refined.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
         best.unwrap_or_else(|| self.fitted(&Arrival::nominal(m), &active.gains))
@@ -326,7 +334,9 @@ impl Fitting<'_> {
         let mut late = vec![0.0; residuals.len()];
         for (j, effect) in at_once.iter().enumerate() {
             let delayed = self.effect(j, by, 0.0, Before::First);
-            late.iter_mut().zip(delayed.iter().zip(effect)).for_each(|(l, (d, e))| *l += (d - e) / by * self.record.period);
+            late.iter_mut()
+                .zip(delayed.iter().zip(effect))
+                .for_each(|(l, (d, e))| *l += (d - e) / by * self.record.period);
         }
         let mut best = (1, f64::INFINITY);
         for window in WINDOWS {
@@ -336,7 +346,8 @@ impl Fitting<'_> {
             }
             let left = self.windowed(&residuals, window);
             let windows = left.len() / n;
-            let squares = |series: &[f64], i: usize| series.iter().skip(i).step_by(n).map(|v| v * v).sum::<f64>();
+            let squares =
+                |series: &[f64], i: usize| series.iter().skip(i).step_by(n).map(|v| v * v).sum::<f64>();
             // Information on each of them by itself, under the residual as noise.
             let informed = |series: &[f64]| {
                 let seen = self.windowed(series, window);
@@ -393,7 +404,8 @@ impl Fitting<'_> {
             }
         }
         let all = self.fitted(&best.arrival, &active.gains);
-        let nominal = self.fitted(&Arrival { before: best.arrival.before, ..Arrival::nominal(m) }, &vec![false; m]);
+        let nominal =
+            self.fitted(&Arrival { before: best.arrival.before, ..Arrival::nominal(m) }, &vec![false; m]);
         let most = self.size(&nominal, &all) - self.size(&all, &all);
         best = all.clone();
         loop {
@@ -435,11 +447,15 @@ impl Fitting<'_> {
         for j in 0..m {
             let gain = arrival.gains[j];
             let own = self.column(j, arrival.delay, arrival.lags[j], arrival.before).to_vec();
-            let slope = |later: &[f64]| own.iter().zip(later).map(|(a, b)| gain * (b - a) / by).collect::<Vec<_>>();
+            let slope =
+                |later: &[f64]| own.iter().zip(later).map(|(a, b)| gain * (b - a) / by).collect::<Vec<_>>();
             let later = slope(self.column(j, arrival.delay + by, arrival.lags[j], arrival.before));
             late.iter_mut().zip(&later).for_each(|(sum, part)| *sum += part);
             if active.lags[j] {
-                columns.push((1 + j, slope(self.column(j, arrival.delay, arrival.lags[j] + by, arrival.before))));
+                columns.push((
+                    1 + j,
+                    slope(self.column(j, arrival.delay, arrival.lags[j] + by, arrival.before)),
+                ));
             }
             if active.gains[j] {
                 columns.push((1 + m + j, own));
@@ -449,8 +465,12 @@ impl Fitting<'_> {
             columns.push((0, late));
         }
         let windows = self.base.len() / n;
-        let weights: Vec<f64> =
-            explained.squares.iter().zip(self.floors()).map(|(s, floor)| 1.0 / (s / windows as f64 + floor)).collect();
+        let weights: Vec<f64> = explained
+            .squares
+            .iter()
+            .zip(self.floors())
+            .map(|(s, floor)| 1.0 / (s / windows as f64 + floor))
+            .collect();
         let normal = DMatrix::from_fn(columns.len(), columns.len(), |r, c| {
             let products = columns[r].1.iter().zip(&columns[c].1).enumerate();
             products.map(|(at, (a, b))| weights[at % n] * a * b).sum::<f64>()
@@ -501,8 +521,11 @@ pub(super) fn fit(
     if active.delay && may_be && whole <= sought.delay * (1.0 + 1e-9) {
         (active.delay, reduced.arrival.delay) = (false, whole);
     }
-    fitting = Fitting::new(model, record, &reduced.arrival, Some(window))?;
-    let last = fitting.searched(&reduced.arrival, &active, sought, 0.05 * record.period);
+    let mut last = reduced;
+    for step in [0.05, 0.01, 0.002] {
+        fitting = Fitting::new(model, record, &last.arrival, Some(window))?;
+        last = fitting.searched(&last.arrival, &active, sought, step * record.period);
+    }
     let spread = fitting.spread(&last, &active);
     Ok((last.arrival, spread))
 }

@@ -188,7 +188,8 @@ impl Hold {
             return Err(Error::configuration("plant", message));
         }
         let residual = next.iter().zip(&end).map(|(next, end)| next - end).collect();
-        let quotient = |ends: &[Vec<f64>; 2], change: f64, r: usize| (ends[0][r] - ends[1][r]) / (2.0 * change);
+        let quotient =
+            |ends: &[Vec<f64>; 2], change: f64, r: usize| (ends[0][r] - ends[1][r]) / (2.0 * change);
         let mut jacobian = vec![0.0; n * n];
         for i in 0..n {
             let change = changes.states[i];

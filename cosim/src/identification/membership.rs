@@ -69,7 +69,8 @@ pub(super) fn check(model: &Predictor<'_>, record: &Record, bounds: &Bounds) -> 
                 let rates: f64 = (0..n).map(|j| reach(j) * bounds.rates[j]).sum();
                 let size = hold.residual[i].abs();
                 let scale = episode.states[i][k].abs().max(episode.states[i][k + 1].abs());
-                let lacking = size - (errors + bounds.errors[i] + inputs + rates) - ROUND_OFF * (size + scale);
+                let lacking =
+                    size - (errors + bounds.errors[i] + inputs + rates) - ROUND_OFF * (size + scale);
                 if lacking > 0.0 {
                     all = false;
                     checked.missing[i] = checked.missing[i].max(lacking / reach(i));

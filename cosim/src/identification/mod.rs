@@ -31,7 +31,7 @@ mod windows;
 
 pub use excitation::{Excited, excite};
 pub use explanation::{Cause, Difference, Explanation, difference};
-pub use proposal::{Finding, Kind, Proposal, identify};
+pub use proposal::{Finding, Kind, Proposal, check, identify};
 pub use record::{EPISODE, Episode, Named, Record};
 
 use fit::Sought;

@@ -96,6 +96,8 @@ pub struct Proposal {
     pub period: f64,
     /// By state, what a rate has to exceed to be proposed, in the unit of the state per s.
     pub resolution: Vec<(String, f64, String)>,
+    /// By state, its least and largest recorded value, and the unit: of what is beyond nothing is known.
+    pub ranges: Vec<(String, [f64; 2], String)>,
     /// What the difference looks like.
     pub difference: Difference,
     /// The best delay in s, if it is longer than can be declared.
@@ -135,22 +137,26 @@ pub fn identify(c: &FilterConfiguration, record: &Record, factor: f64) -> Result
             *gain = 1.0;
         }
     }
-    // Errors, rates and widths of the gains, for all holds and without the worst.
+    // What the intervals of lags do not cover is explained by errors, rates and widths of the gains: for all holds, and without the
+    // worst.
     let fitting = Fitting::new(&model, record, &arrival, Some(1))?;
     let (linear, scales) = (&fitting.linear, &fitting.scales);
     let effects = linear.effects(&linear.arriving);
-    let windows = Windows::new(linear, &effects);
+    let ends: Vec<[Ends; 2]> = (0..record.inputs.len()).map(|j| ends(&arrival, &spread, j, factor)).collect();
+    let covered = covered(&fitting, &arrival, &ends);
+    let windows = Windows::new(linear, &effects, &covered);
     let program = Program::new(&windows, linear, &effects, scales, RESOLUTION);
-    let all = program.solve(&vec![false; linear.holds.len()], None);
-    let most = program.solve(&worst(linear, scales), Some(&all));
+    let all = program.solve(&vec![false; linear.holds.len()]);
+    let most = program.solve(&worst(linear, scales));
     // Declare it, and check that this contains the recording.
-    let mut bounds = bounds(&arrival, &spread, &all, factor);
+    let mut bounds = bounds(&arrival, &ends, &all, factor);
     let least: Vec<f64> = scales.iter().map(|scale| RESOLUTION * scale).collect();
     prune(&model, record, &mut bounds, scales)?;
     let mut checked = membership::check(&model, record, &bounds)?;
     const ROUNDS: usize = 3;
     for _ in 0..ROUNDS {
-        let lacks: Vec<bool> = checked.missing.iter().zip(&least).map(|(missing, least)| missing > least).collect();
+        let lacks: Vec<bool> =
+            checked.missing.iter().zip(&least).map(|(missing, least)| missing > least).collect();
         if !lacks.contains(&true) {
             break;
         }
@@ -176,6 +182,12 @@ pub fn identify(c: &FilterConfiguration, record: &Record, factor: f64) -> Result
         duration: record.duration(),
         period: record.period,
         resolution: resolution.map(|(s, least)| (s.name.clone(), *least, over_seconds(&s.unit, 1))).collect(),
+        ranges: record
+            .states
+            .iter()
+            .enumerate()
+            .map(|(i, s)| (s.name.clone(), record.state_range(i), s.unit.clone()))
+            .collect(),
         difference: difference(c, record)?,
         long_delay,
         excited: record.inputs.iter().enumerate().map(used).collect(),
@@ -183,40 +195,67 @@ pub fn identify(c: &FilterConfiguration, record: &Record, factor: f64) -> Result
     })
 }
 
-/// Refuses files for which nothing can be declared.
-pub(super) fn check(c: &FilterConfiguration) -> Result<(), Error> {
+/// Refuses a file for which nothing can be declared.
+///
+/// # Errors
+///
+/// One without a model, or with an `[integrator]`, behind which plans account for no uncertainty.
+pub fn check(c: &FilterConfiguration) -> Result<(), Error> {
     if let Some(barrier) = c.external() {
-        let message =
-            format!("has inputs alone, since {} is external: without a model nothing can be compared", barrier.name);
+        let message = format!(
+            "has inputs alone, since {} is external: without a model nothing can be compared",
+            barrier.name
+        );
         return Err(Error::configuration("plant", message));
     }
     if c.integrator.is_some() {
-        let message = "behind it nothing can be declared of the plant: plans do not account for [uncertainty] there";
+        let message =
+            "behind it nothing can be declared of the plant: plans do not account for [uncertainty] there";
         return Err(Error::configuration("integrator", message));
     }
     Ok(())
 }
 
-/// What is declared: what was found, times `factor`, rounded outward. A lag and a gain that were found keep a distance of
-/// `factor` − 1 of themselves and of their difference from 1, and of what noise hides.
-fn bounds(arrival: &Arrival, spread: &Spread, sizes: &Sizes, factor: f64) -> Bounds {
-    let interval = |middle: f64, half: f64, least: f64| [down((middle - half).max(least)), up(middle + half)];
-    let lag = |j: usize| {
-        let lag = arrival.lags[j];
-        let half = (factor - 1.0) * lag + factor * DEVIATIONS * spread.lags[j];
-        if lag == 0.0 { [0.0; 2] } else { interval(lag, half, 0.0) }
-    };
-    let gain = |j: usize| {
-        let gain = arrival.gains[j];
-        let found = sizes.gains[j] + DEVIATIONS * spread.gains[j];
-        let half = (factor * found).max((factor - 1.0) * (gain - 1.0).abs());
-        if gain == 1.0 && half == 0.0 { [1.0; 2] } else { interval(gain, half, LEAST_GAIN) }
+/// The ends of an interval.
+type Ends = [f64; 2];
+
+/// The lag and the gain of input `j`, as intervals: each keeps a distance of `factor` − 1 of itself, or of its difference from 1, and of what
+/// noise hides.
+fn ends(arrival: &Arrival, spread: &Spread, j: usize, factor: f64) -> [Ends; 2] {
+    let (lag, gain) = (arrival.lags[j], arrival.gains[j]);
+    let wide = (factor - 1.0) * lag + factor * DEVIATIONS * spread.lags[j];
+    let half = (factor * DEVIATIONS * spread.gains[j]).max((factor - 1.0) * (gain - 1.0).abs());
+    let lags = if lag == 0.0 { [0.0; 2] } else { [(lag - wide).max(0.0), lag + wide] };
+    [lags, [(gain - half).max(LEAST_GAIN), gain + half]]
+}
+
+/// How much of each residual the intervals of lags in `ends` explain, by hold and state. Those of gains are left to explain what is not
+/// known of gains, since a wind would hide in them wherever inputs are large.
+fn covered(fitting: &Fitting<'_>, arrival: &Arrival, ends: &[[Ends; 2]]) -> Vec<f64> {
+    let mut covered = vec![0.0; fitting.linear.holds.len() * fitting.linear.states];
+    for (j, [lags, _]) in ends.iter().enumerate().filter(|(_, [lags, _])| lags[0] < lags[1]) {
+        let [fast, slow] = lags.map(|lag| fitting.effect(j, arrival.delay, lag, arrival.before));
+        let of_lag = fast.iter().zip(&slow).map(|(fast, slow)| 0.5 * arrival.gains[j] * (fast - slow).abs());
+        covered.iter_mut().zip(of_lag).for_each(|(covered, part)| *covered += part);
+    }
+    covered
+}
+
+/// What is declared: what was found, times `factor`, rounded outward.
+fn bounds(arrival: &Arrival, ends: &[[Ends; 2]], sizes: &Sizes, factor: f64) -> Bounds {
+    let gain = |(j, [_, [least, most]]): (usize, &[Ends; 2])| {
+        let more = (factor * sizes.gains[j] - 0.5 * (most - least)).max(0.0);
+        if *least == 1.0 && *most == 1.0 && more == 0.0 {
+            [1.0; 2]
+        } else {
+            [down((least - more).max(LEAST_GAIN)), up(most + more)]
+        }
     };
     Bounds {
         // To a part of a step that no rate shows: there is no safe side to round it to.
         delay: rounded(arrival.delay, 4, f64::round),
-        lags: (0..arrival.lags.len()).map(lag).collect(),
-        gains: (0..arrival.gains.len()).map(gain).collect(),
+        lags: ends.iter().map(|[[least, most], _]| [down(*least), up(*most)]).collect(),
+        gains: ends.iter().enumerate().map(gain).collect(),
         rates: sizes.rates.iter().map(|rate| up(factor * rate)).collect(),
         errors: sizes.errors.iter().map(|error| up(factor * error)).collect(),
     }
@@ -249,9 +288,10 @@ fn findings(
     let mut findings = Vec::new();
     let instant = |v: usize| all.instants[v].map(|(time, holds)| [time, holds as f64 * record.period]);
     let differs = |found: [f64; 2], without: [f64; 2]| {
-        let change = (found[0] - without[0]).abs().max((found[1] - without[1]).abs());
+        let [wide, narrow] =
+            [found, without].map(|ends| if ends[0] == ends[1] { ends[1] } else { ends[1] - ends[0] });
         // Less is not seen in four digits.
-        (change > 1e-3 * (found[1] - found[0].min(0.0)).abs()).then_some(without)
+        (wide - narrow > 1e-3 * wide).then_some(without)
     };
     if bounds.delay > 0.0 {
         findings.push(Finding {
@@ -279,7 +319,7 @@ fn findings(
         }
         if bounds.gains[j] != [1.0; 2] {
             let around = |width: f64| {
-                let half = width + DEVIATIONS * spread.gains[j];
+                let half = width.max(DEVIATIONS * spread.gains[j]);
                 [arrival.gains[j] - half, arrival.gains[j] + half]
             };
             let found = around(all.gains[j]);
@@ -348,9 +388,13 @@ mod tests {
 
     #[test]
     fn numbers_are_rounded_outward() {
-        for (value, below, above) in
-            [(0.12345, 0.123, 0.124), (0.1, 0.1, 0.1), (0.9999, 0.999, 1.0), (1234.0, 1230.0, 1240.0), (0.0, 0.0, 0.0)]
-        {
+        for (value, below, above) in [
+            (0.12345, 0.123, 0.124),
+            (0.1, 0.1, 0.1),
+            (0.9999, 0.999, 1.0),
+            (1234.0, 1230.0, 1240.0),
+            (0.0, 0.0, 0.0),
+        ] {
             assert_eq!((down(value), up(value)), (below, above), "{value}");
         }
     }

@@ -126,7 +126,8 @@ impl Record {
             for signal in signals {
                 let column = column(recording, signal, is_input, named)?;
                 let [factor, offset] = conversion(&recording.columns()[column], signal, &mut notes)?;
-                let values: Vec<f64> = recording.column(column).map(|value| factor * value + offset).collect();
+                let values: Vec<f64> =
+                    recording.column(column).map(|value| factor * value + offset).collect();
                 // The inputs of the last row act on nothing that was recorded.
                 let used = values.len().saturating_sub(usize::from(is_input));
                 if let Some(k) = values[..used].iter().position(|value| !value.is_finite()) {
@@ -145,7 +146,8 @@ impl Record {
         }
         let [states, inputs] = found;
         let marks = recording.series(EPISODE);
-        let is_cut = |k: usize| marks.as_ref().is_some_and(|marks| marks[k].to_bits() != marks[k - 1].to_bits());
+        let is_cut =
+            |k: usize| marks.as_ref().is_some_and(|marks| marks[k].to_bits() != marks[k - 1].to_bits());
         let mut begin = 0;
         for end in 1..=times.len() {
             if end < times.len() && !is_cut(end) {
@@ -213,14 +215,19 @@ impl Record {
 
     /// The recorded time, in s.
     pub fn duration(&self) -> f64 {
-        let length = |e: &Episode| e.times.last().zip(e.times.first()).map_or(0.0, |(end, begin)| end - begin);
+        let length =
+            |e: &Episode| e.times.last().zip(e.times.first()).map_or(0.0, |(end, begin)| end - begin);
         self.episodes.iter().map(length).sum()
     }
 
     /// The least and the largest value of input `j`, in its unit.
     pub fn input_range(&self, j: usize) -> [f64; 2] {
-        let values = self.episodes.iter().flat_map(|e| &e.inputs[j][..e.holds()]);
-        values.fold([f64::INFINITY, f64::NEG_INFINITY], |[min, max], v| [v.min(min), v.max(max)])
+        range(self.episodes.iter().flat_map(|e| &e.inputs[j][..e.holds()]))
+    }
+
+    /// The least and the largest value of state `i`, in its unit.
+    pub fn state_range(&self, i: usize) -> [f64; 2] {
+        range(self.episodes.iter().flat_map(|e| &e.states[i]))
     }
 
     /// A table of it, with a column of episodes, that reads back as the same.
@@ -246,6 +253,11 @@ impl Record {
         }
         recording
     }
+}
+
+/// The least and the largest of `values`.
+fn range<'a>(values: impl Iterator<Item = &'a f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[min, max], v| [v.min(min), v.max(max)])
 }
 
 /// The position of the column of `signal`.
@@ -290,8 +302,7 @@ fn column(
         }
         _ => {
             let all: Vec<_> = found.iter().map(|(i, _)| recording.columns()[*i].name.as_str()).collect();
-            let message =
-                format!("may be any of {}; name one by --column {name}={}", all.join(", "), all[0]);
+            let message = format!("may be any of {}; name one by --column {name}={}", all.join(", "), all[0]);
             Err(Error::configuration(format!("column {name}"), message))
         }
     }
@@ -320,7 +331,8 @@ pub(super) fn converted(
         Ok(Fit::Same | Fit::Unknown) => Ok([1.0, 0.0]),
         Err(reason) => {
             let given = from.name.unwrap_or("another unit");
-            let message = format!("is in {given}, but {} of the model is in {}, {reason}", signal.name, signal.unit);
+            let message =
+                format!("is in {given}, but {} of the model is in {}, {reason}", signal.name, signal.unit);
             Err(Error::configuration(format!("column {name}"), message))
         }
     }

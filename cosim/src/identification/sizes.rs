@@ -2,7 +2,7 @@
 //!
 //! Of all sizes that meet the conditions of [`super::windows`], those of least price are taken. The price of a rate is its part of the
 //! state's own rates, that of a width of a gain is what it adds at the largest input, a little less where both explain the same, and
-//! an error of ε costs as a rate that leads as far as 2 ε in a second. Errors are allowed where consecutive residuals are
+//! an error of ε costs as a rate that leads as far as 2 ε in a quarter of a second. Errors are allowed where consecutive residuals are
 //! anti-correlated, as noise makes them and nothing else does.
 
 use std::collections::BTreeMap;
@@ -13,8 +13,12 @@ use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeCone
 use super::linear::Linear;
 use super::windows::{Condition, Windows};
 
-/// How far errors may be beyond their standard deviation.
-const FAR: f64 = 5.0;
+/// How far errors may be, in standard deviations.
+const FAR: f64 = 4.0;
+/// Standard deviations of chance by which consecutive residuals have to be anti-correlated for noise to be seen.
+const CHANCE: f64 = 4.0;
+/// In s; with more, gusts count as errors, with less, errors as gusts.
+const REACH: f64 = 0.25;
 /// The price of a gain's width against a rate that explains as much at the largest input.
 const GAIN_PRICE: f64 = 0.8;
 /// A size is left out if the others explain everything for this much more.
@@ -49,13 +53,15 @@ pub(super) struct Program<'a> {
 pub(super) fn noise(linear: &Linear) -> Vec<f64> {
     let n = linear.states;
     let of_state = |i: usize| {
+        let all = linear.holds.len() as f64;
+        let mean = linear.holds.iter().map(|hold| hold.residual[i]).sum::<f64>() / all;
         // Products of residuals that are 0, 1 and 2 holds apart.
         let mut sums = [(0.0, 0.0); 3];
         for (k, hold) in linear.holds.iter().enumerate() {
             for (apart, (sum, count)) in sums.iter_mut().enumerate() {
                 let Some(other) = k.checked_sub(apart).map(|at| &linear.holds[at]) else { continue };
                 if other.episode == hold.episode {
-                    *sum += hold.residual[i] * other.residual[i];
+                    *sum += (hold.residual[i] - mean) * (other.residual[i] - mean);
                     *count += 1.0;
                 }
             }
@@ -64,7 +70,7 @@ pub(super) fn noise(linear: &Linear) -> Vec<f64> {
         // What changes slowly is the same in both.
         let variance = second - next;
         let count = sums[0].1;
-        let by_chance = 3.0 * own * punctual_core::elementary::sqrt(2.0 / f64::max(count, 1.0));
+        let by_chance = CHANCE * own * punctual_core::elementary::sqrt(2.0 / f64::max(count, 1.0));
         if variance > by_chance { punctual_core::elementary::sqrt(variance) } else { 0.0 }
     };
     (0..n).map(of_state).collect()
@@ -73,10 +79,16 @@ pub(super) fn noise(linear: &Linear) -> Vec<f64> {
 impl<'a> Program<'a> {
     /// With the noise that `linear` shows. `effects` are what the inputs do by themselves, by hold, input and state; `scales` the sizes
     /// of the states' rates, and `resolution` the part of them below which nothing is said.
-    pub(super) fn new(windows: &'a Windows, linear: &Linear, effects: &[f64], scales: &[f64], resolution: f64) -> Self {
+    pub(super) fn new(
+        windows: &'a Windows,
+        linear: &Linear,
+        effects: &[f64],
+        scales: &[f64],
+        resolution: f64,
+    ) -> Self {
         let (n, m) = (linear.states, linear.inputs);
         let noise = noise(linear);
-        let mut prices: Vec<f64> = scales.iter().map(|scale| 2.0 / scale).collect();
+        let mut prices: Vec<f64> = scales.iter().map(|scale| 2.0 / (REACH * scale)).collect();
         prices.extend(scales.iter().map(|scale| 1.0 / scale));
         let price = |j: usize| {
             let mut most = 0.0_f64;
@@ -96,16 +108,13 @@ impl<'a> Program<'a> {
         Self { windows, prices, most, least }
     }
 
-    /// The sizes of least price that explain every window without a hold that is `left_out`. Each is at most that of `most`, if given.
-    pub(super) fn solve(&self, left_out: &[bool], most: Option<&Sizes>) -> Sizes {
+    /// The sizes of least price that explain every window without a hold that is `left_out`.
+    pub(super) fn solve(&self, left_out: &[bool]) -> Sizes {
         let mut limits = self.most.clone();
-        if let Some(most) = most {
-            let given = most.errors.iter().chain(&most.rates).chain(&most.gains);
-            limits.iter_mut().zip(given).for_each(|(limit, given)| *limit = limit.min(given * (1.0 + 1e-6)));
-        }
         let mut active = Vec::new();
         let (mut best, mut duals) = self.solved(left_out, &limits, &mut active);
-        let price = |sizes: &[f64]| sizes.iter().zip(&self.prices).map(|(size, price)| size * price).sum::<f64>();
+        let price =
+            |sizes: &[f64]| sizes.iter().zip(&self.prices).map(|(size, price)| size * price).sum::<f64>();
         // Fewer sizes are a simpler explanation, the cheapest first.
         let allowed = FEWER * price(&best);
         let mut order: Vec<usize> = (0..best.len()).filter(|v| best[*v] > 0.0).collect();
@@ -137,7 +146,8 @@ impl<'a> Program<'a> {
     /// By how much a condition is not met, as a part of what one price gives it.
     fn lacks(&self, condition: &Condition, sizes: &[f64]) -> f64 {
         let given: f64 = condition.coefficients.iter().zip(sizes).map(|(c, size)| c * size).sum();
-        let unit = condition.coefficients.iter().zip(&self.prices).map(|(c, price)| c / price).fold(0.0, f64::max);
+        let unit =
+            condition.coefficients.iter().zip(&self.prices).map(|(c, price)| c / price).fold(0.0, f64::max);
         (condition.size * (1.0 - MET) - given) / unit - 1e-9
     }
 
@@ -180,7 +190,11 @@ impl<'a> Program<'a> {
                 more[rate] = more[rate].max((condition.size - given) / condition.coefficients[rate]);
             }
         });
-        sizes.iter_mut().zip(&more).zip(limits).for_each(|((size, more), limit)| *size = (*size + more).min(*limit));
+        sizes
+            .iter_mut()
+            .zip(&more)
+            .zip(limits)
+            .for_each(|((size, more), limit)| *size = (*size + more).min(*limit));
         (sizes, duals)
     }
 
@@ -249,7 +263,11 @@ impl<'a> Program<'a> {
             }
             let share = |(condition, dual): (&Condition, &f64)| {
                 let tight = self.lacks(condition, sizes).abs() < 1e-3;
-                (dual * condition.coefficients[v] * f64::from(u8::from(tight)), condition.time, condition.holds)
+                (
+                    dual * condition.coefficients[v] * f64::from(u8::from(tight)),
+                    condition.time,
+                    condition.holds,
+                )
             };
             let shares = active.iter().zip(duals).map(share);
             let most = shares.max_by(|a, b| a.0.total_cmp(&b.0))?;

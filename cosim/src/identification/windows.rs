@@ -1,4 +1,4 @@
-//! What is left of a recording over windows of one hold up to about a second, and what errors, rates and gains may contribute.
+//! What is left of a recording over windows of one hold up to some seconds, and what errors, rates and gains may contribute.
 //!
 //! Over the window of holds k to l the linear model of [`super::linear`] leaves R = e_l − P e_k + Σ_s P_s ∫w, with P and P_s products
 //! of Jacobians. If measurements are off by at most ε, rates by w and gains by γ, by component, then
@@ -12,7 +12,7 @@ use super::linear::Linear;
 
 /// Blocks of a level that one of the next level has, and the longest window of a level in blocks.
 const BLOCKS: usize = 8;
-/// The longest window: in s, and in holds where these are long.
+/// Levels of windows end with the one whose blocks are this long: in s, and in holds where these are long.
 const REACH: (f64, usize) = (1.0, 16);
 
 /// A time over which the model is linear.
@@ -27,6 +27,7 @@ struct Block {
     jacobian: Vec<f64>,
     rates: Vec<f64>,
     gains: Vec<f64>,
+    covered: Vec<f64>,
 }
 
 /// The condition that one state over one window makes: `coefficients` · sizes ≥ `size`.
@@ -38,7 +39,7 @@ pub(super) struct Condition {
     pub(super) time: f64,
     /// The state.
     pub(super) state: usize,
-    /// The largest of what is left.
+    /// What is left and not covered.
     pub(super) size: f64,
     /// Of errors, rates and gains, by state, state and input.
     pub(super) coefficients: Vec<f64>,
@@ -52,8 +53,9 @@ pub(super) struct Windows {
 }
 
 impl Windows {
-    /// Those of `linear`, of which `effects` are what the inputs do by themselves, by hold, input and state.
-    pub(super) fn new(linear: &Linear, effects: &[f64]) -> Self {
+    /// Those of `linear`. Of it `effects` are what the inputs do by themselves, by hold, input and state; `covered` is the size of what is
+    /// explained anyway, by hold and state.
+    pub(super) fn new(linear: &Linear, effects: &[f64], covered: &[f64]) -> Self {
         let (n, m) = (linear.states, linear.inputs);
         let of_hold = |(k, hold): (usize, &super::linear::Hold)| {
             // ∫|A(s)| over the hold, by the trapezoidal rule.
@@ -75,10 +77,14 @@ impl Windows {
                 jacobian: hold.jacobian.clone(),
                 rates,
                 gains,
+                covered: covered[k * n..(k + 1) * n].to_vec(),
             }
         };
-        let mut windows =
-            Self { states: n, inputs: m, levels: vec![linear.holds.iter().enumerate().map(of_hold).collect()] };
+        let mut windows = Self {
+            states: n,
+            inputs: m,
+            levels: vec![linear.holds.iter().enumerate().map(of_hold).collect()],
+        };
         let all = linear.holds.len();
         while let Some(level) = windows.levels.last() {
             let Some(block) = level.first() else { break };
@@ -87,7 +93,8 @@ impl Windows {
                 break;
             }
             let whole = |part: &&[Block]| {
-                part.len() == BLOCKS && part[0].episode == part[BLOCKS - 1].episode
+                part.len() == BLOCKS
+                    && part[0].episode == part[BLOCKS - 1].episode
                     && part.iter().all(|b| b.holds == block.holds)
             };
             let mut next = Vec::new();
@@ -132,6 +139,7 @@ impl Windows {
         for i in 0..n {
             let row = &product[i * n..(i + 1) * n];
             whole.residual[i] += row.iter().zip(&block.residual).map(|(p, r)| p * r).sum::<f64>();
+            whole.covered[i] += row.iter().zip(&block.covered).map(|(p, c)| p.abs() * c).sum::<f64>();
             for j in 0..n {
                 whole.rates[i * n + j] += (0..n).map(|l| row[l].abs() * block.rates[l * n + j]).sum::<f64>();
             }
@@ -139,7 +147,8 @@ impl Windows {
                 whole.gains[i * m + j] += (0..n).map(|l| row[l].abs() * block.gains[l * m + j]).sum::<f64>();
             }
         }
-        let entry = |at: usize| (0..n).map(|l| product[at / n * n + l] * block.jacobian[l * n + at % n]).sum();
+        let entry =
+            |at: usize| (0..n).map(|l| product[at / n * n + l] * block.jacobian[l * n + at % n]).sum();
         *product = (0..n * n).map(entry).collect();
         whole.first = block.first;
         whole.holds += block.holds;
@@ -162,7 +171,8 @@ impl Windows {
                 for count in 1..=BLOCKS {
                     if count > 1 {
                         let Some(block) = end.checked_sub(count - 1).map(|at| &level[at]) else { break };
-                        let is_next = block.episode == whole.episode && block.first + block.holds == whole.first;
+                        let is_next =
+                            block.episode == whole.episode && block.first + block.holds == whole.first;
                         if !is_next {
                             break;
                         }
@@ -183,7 +193,7 @@ impl Windows {
                             holds: whole.holds,
                             time: whole.time,
                             state,
-                            size: whole.residual[state].abs(),
+                            size: (whole.residual[state].abs() - whole.covered[state]).max(0.0),
                             coefficients,
                         });
                     }

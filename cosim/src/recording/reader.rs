@@ -100,7 +100,8 @@ mod tests {
 
     #[test]
     fn what_is_written_reads_back() {
-        let column = |name: &str, unit: Option<&str>| Column { name: name.into(), unit: unit.map(Into::into) };
+        let column =
+            |name: &str, unit: Option<&str>| Column { name: name.into(), unit: unit.map(Into::into) };
         let mut recording = Recording::new(vec![column("a.v", Some("m/s")), column("a.y[1,2]", None)]);
         recording.push(0.0, &[0.1 + 0.2, -0.0]);
         recording.push(1e-3, &[1.5e-300, f64::INFINITY]);
@@ -108,7 +109,10 @@ mod tests {
             let mut text = Vec::new();
             recording.write_csv(&mut text, units).unwrap();
             let read = parse(&String::from_utf8(text).unwrap()).unwrap();
-            assert_eq!((read.times(), read.row(0), read.row(1)), (&[0.0, 1e-3][..], recording.row(0), recording.row(1)));
+            assert_eq!(
+                (read.times(), read.row(0), read.row(1)),
+                (&[0.0, 1e-3][..], recording.row(0), recording.row(1))
+            );
             assert_eq!(read.columns()[0].unit.is_some(), units);
             assert_eq!(read.columns()[1].name, "a.y[1,2]");
         }
@@ -128,7 +132,10 @@ mod tests {
             ("a,b\n1,2\n", "line 1: no column \"time\" or \"t\" (in s) among a, b; name the time so"),
             ("t,v\n", "line 2: is missing, must be a row of numbers"),
             ("t,v\n0,1\n1\n", "line 3: has 1 fields, must have 2 as line 1 has"),
-            ("t;v\n0;1.0\n1;1,5\n", "line 3, column v: is \"1,5\", must be a number with a decimal point, such as 0.5"),
+            (
+                "t;v\n0;1.0\n1;1,5\n",
+                "line 3, column v: is \"1,5\", must be a number with a decimal point, such as 0.5",
+            ),
         ] {
             assert_eq!(parse(text).unwrap_err().to_string(), message);
         }
