@@ -33,7 +33,7 @@ pub struct Arguments {
     /// The column of a state or input, or the variable of the FMU, where it has another name: "v=speed"; may be repeated
     #[arg(long, value_name = "SIGNAL=COLUMN")]
     column: Vec<String>,
-    /// How often what was found is declared: a recording shows what was, not what may be
+    /// The factor by which what was found is widened, from 1 on: a recording shows what was, not what may be
     #[arg(long, value_name = "NUMBER", default_value_t = 1.2)]
     factor: f64,
     /// How long an FMU is excited, in s
@@ -267,7 +267,7 @@ fn verdict(proposal: &Proposal) -> String {
     ));
     sentences.push(if proposal.factor > 1.0 {
         format!(
-            "so {} times what was found is declared (--factor). That is a guess; recordings of what the plant is to do are better.",
+            "so what was found is widened by a factor of {} (--factor). That is a guess; recordings of what the plant is to do are better.",
             number(proposal.factor)
         )
     } else {

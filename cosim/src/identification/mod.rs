@@ -7,7 +7,8 @@
 //! record         states and inputs at samples, from the columns of recordings
 //! arrival        inputs behind a delay and a lag
 //! linear         each hold predicted, with derivatives
-//! fit            delay, lags and gains that explain most
+//! fit            gains behind a delay and lags, by least squares
+//! search         the delay and lags that explain most
 //! windows        what is left over one hold and over many
 //! sizes          the smallest errors, rates and widths of gains that explain the rest: a linear program
 //! membership     whether bounds contain every hold
@@ -26,6 +27,7 @@ mod linear;
 mod membership;
 mod proposal;
 mod record;
+mod search;
 mod sizes;
 mod windows;
 
@@ -34,7 +36,7 @@ pub use explanation::{Cause, Difference, Explanation, difference};
 pub use proposal::{Finding, Kind, Proposal, check, identify};
 pub use record::{EPISODE, Episode, Named, Record};
 
-use fit::Sought;
+use search::Sought;
 
 #[cfg(test)]
 mod tests;

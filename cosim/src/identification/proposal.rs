@@ -6,10 +6,11 @@ use serde::Serialize;
 
 use super::arrival::Arrival;
 use super::explanation::{Difference, difference};
-use super::fit::{DEVIATIONS, Fitting, Sought, Spread, fit};
+use super::fit::Fitting;
 use super::linear::Predictor;
 use super::membership::{self, Bounds};
 use super::record::Record;
+use super::search::{DEVIATIONS, Sought, Spread, fit};
 use super::sizes::{Program, Sizes, worst};
 use super::windows::Windows;
 use crate::error::Error;
@@ -84,7 +85,7 @@ impl Finding {
 pub struct Proposal {
     /// The values to declare; nothing if the plant is the model, as far as the recording shows.
     pub findings: Vec<Finding>,
-    /// How often what was found is declared.
+    /// The factor by which what was found is widened.
     pub factor: f64,
     /// Holds between samples.
     pub holds: usize,

@@ -284,12 +284,15 @@ fn one_glitch_is_told_from_the_rest() {
     assert!(rate.without_worst.is_some_and(|without| without[1] < 0.15), "{rate:?}");
 }
 
+/// What a test makes of a row: its number, time and values; `None` drops it.
+type Edit<'a> = &'a dyn Fn(usize, f64, Vec<f64>) -> Option<(f64, Vec<f64>)>;
+
 /// What is wrong with a recording is said, with the remedy.
 #[test]
 fn recordings_that_cannot_be_used_are_refused() {
     let c = cart();
     let good = recorded(NOTHING, 40, 1);
-    let told = |columns: &[&str], edit: &dyn Fn(usize, f64, Vec<f64>) -> Option<(f64, Vec<f64>)>| {
+    let told = |columns: &[&str], edit: Edit<'_>| {
         let column = |name: &&str| Column { name: (*name).into(), unit: None };
         let mut made = Recording::new(columns.iter().map(column).collect());
         for k in 0..good.len() {
