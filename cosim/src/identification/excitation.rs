@@ -1,7 +1,7 @@
 //! Recordings of an FMU: it is excited with inputs within their bounds, and its states are read at every step.
 //!
-//! Four forms of inputs share the time: steps, that show lags and gains; fast switching between the bounds, that shows delays; sums of sines; and
-//! slow ramps, that show what depends on the size of an input. Each has a mean near 0, or near the middle of bounds that do not
+//! Four forms of inputs share the time: steps, which show lags and gains; fast switching between the bounds, which shows delays; sums of
+//! sines; and slow ramps, which show what depends on the size of an input. Each has a mean near 0, or near the middle of bounds that do not
 //! contain 0. A form begins anew from the start where a state leaves the range for which the model is meant, with smaller inputs if that
 //! came soon.
 
@@ -161,7 +161,8 @@ pub fn excite(
     record.notes = notes;
     let ended = record.states.iter().map(|state| state.name.clone()).zip(ended);
     let ended = ended.filter(|(_, count)| *count > 0).collect();
-    Ok(Excited { record, ended })
+    // The plant may leave its range at once.
+    Ok(Excited { record: record.completed()?, ended })
 }
 
 /// The variable of `signal`.

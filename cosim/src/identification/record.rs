@@ -172,7 +172,7 @@ impl Record {
     }
 
     /// Checks the samples, and finds the period.
-    fn completed(mut self) -> Result<Self, Error> {
+    pub(super) fn completed(mut self) -> Result<Self, Error> {
         let lengths = |e: &Episode| e.times.windows(2).map(|t| t[1] - t[0]).collect::<Vec<_>>();
         let mut all: Vec<f64> = self.episodes.iter().flat_map(lengths).collect();
         if all.len() < FEWEST {
