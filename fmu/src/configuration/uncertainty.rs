@@ -85,7 +85,7 @@ pub(super) static SECTION: Section = Section {
             Key::new(
                 "jitter",
                 Number(Is("1"), JITTER),
-                Some("0: at once"),
+                Some("0: every step comes as expected"),
                 "the part of a step by which the next one may come late; it may also come at any time before. For loops with a \
                  measured clock, and for masters with steps of several lengths",
             ),

@@ -209,8 +209,9 @@ impl Filter {
     /// has been reached; or, if nothing else keeps the promise, the next input of the plan itself.
     ///
     /// Assumptions: the plant is the model, its state is measured exactly, and samples are one period apart. With
-    /// [rates](Plans::uncertain_rates), [gains](Plans::uncertain_gains) and [measurement
-    /// errors](crate::filter::FilterBuilder::measurement_errors) declared, every plant within them keeps the promise. It then
+    /// [rates](Plans::uncertain_rates), [gains](Plans::uncertain_gains), [lags](Plans::uncertain_lags), [measurement
+    /// errors](crate::filter::FilterBuilder::measurement_errors) or [late samples](Plans::jitter) declared, every plant within
+    /// them keeps the promise. It then
     /// has an [end](Assurance::until), which is postponed again and again. If the plant
     /// was seen to differ from the model, and 1.5 times that difference could take it out of a set before the next sample,
     /// the guarantee is lost for that sample. A sample may be repeated at the same time (not behind a delay), come early, or come late by a
