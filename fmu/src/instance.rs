@@ -371,6 +371,7 @@ impl Instance {
         self.mode = Mode::STEP;
         (self.unbroken, self.mistimed) = (Unbroken::at(self.time), Mistimed::Never);
         self.block.output(self.time, &mut self.values);
+        self.block.begin(&mut self.values);
         self.fresh = true;
         Ok(())
     }
@@ -751,6 +752,9 @@ impl Instance {
         // they are.
         if lazy && (self.configured || self.configure().is_ok()) {
             self.block.output(self.time, &mut self.values);
+            if self.mode == Mode::INITIALIZATION {
+                self.block.begin(&mut self.values);
+            }
             self.fresh = true;
         }
     }

@@ -117,7 +117,11 @@ impl Product {
         let experiment = self.configuration.experiment();
         let description = match &self.configuration {
             Configuration::Filter(c) => {
-                format!("Fixed-time safety filter for a {}", c.plant.title())
+                let late = match c.actuation_delay > 0.0 {
+                    true => format!(", whose input acts {} s after its sample", c.actuation_delay),
+                    false => String::new(),
+                };
+                format!("Fixed-time safety filter for a {}{late}", c.plant.title())
             }
             Configuration::Plant(c) => match &c.plant {
                 PlantSection::Reference(plant) => format!("Reference plant: {}", plant.model.title()),

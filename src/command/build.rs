@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use punctual_cosim::coupling::Order;
 use punctual_cosim::error::Error;
 use punctual_cosim::package;
 use punctual_fmu::configuration::{Configuration, FmiVersion};
@@ -32,6 +33,19 @@ pub struct Arguments {
     /// With FMI 3.0, scalars instead of arrays, for tools that cannot take arrays
     #[arg(long)]
     scalars: bool,
+    /// The master that a filter is for. One that is a step late gives the filter an `actuation_delay` of a step, which its promises
+    /// account for [default: the file's `actuation_delay`; for a system file its `order`]
+    #[arg(long, value_name = "ORDER")]
+    master: Option<Master>,
+}
+
+/// The order of calls of a master.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Master {
+    /// A filter's input acts in the step of its sample: `actuation_delay` as in the file
+    GaussSeidel,
+    /// All values are exchanged before a step, so an input acts one step after its sample
+    Jacobi,
 }
 
 /// The versions of SSP to pack for.
@@ -73,7 +87,18 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
         let message = "is for an .ssp file, which is made from a system file";
         return Err(Error::configuration("--ssp", message));
     }
-    let configuration = super::read(file)?;
+    let configuration = match super::read(file)? {
+        Configuration::Filter(filter) if arguments.master == Some(Master::Jacobi) => {
+            Configuration::Filter(filter.for_jacobi().map_err(|e| Error::from(e).in_file(file))?)
+        }
+        configuration @ (Configuration::Plant(_) | Configuration::Controller(_))
+            if arguments.master.is_some() =>
+        {
+            let message = format!("is for a filter, and {} is a {}", file.display(), configuration.kind());
+            return Err(Error::configuration("--master", message));
+        }
+        configuration => configuration,
+    };
     for note in configuration.in_degrees() {
         output::note(&format!("note: {note}"));
     }
@@ -160,7 +185,11 @@ fn pack(arguments: &Arguments, file: &Path) -> Result<ExitCode, Error> {
         None | Some(Ssp::One) => SspVersion::One,
         Some(Ssp::Two) => SspVersion::Two,
     };
-    let packed = package::system::pack(file, &arguments.output, version)?;
+    let order = arguments.master.map(|master| match master {
+        Master::GaussSeidel => Order::GaussSeidel,
+        Master::Jacobi => Order::Jacobi,
+    });
+    let packed = package::system::pack(file, &arguments.output, version, order)?;
     packed.warnings.iter().for_each(|warning| output::warning(warning));
     for note in &packed.notes {
         output::note(&format!("note: {note}"));

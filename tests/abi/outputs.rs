@@ -73,6 +73,39 @@ fn the_order_of_reading_and_stepping_changes_nothing() {
     }
 }
 
+/// A master that is a step late hands on what it reads at the start for the first step. With a delay that is what the filter assumes
+/// to act there: the admissible input nearest 0. Once the inputs of the first step are set, it is the sample of these.
+#[test]
+fn before_the_first_inputs_a_late_filter_shows_what_acts() {
+    let text =
+        FILTER.replace("kind", "actuation_delay = 0.001\nkind").replacen("[-50.0, 50.0]", "[1.5, 50.0]", 1);
+    let fmu = Fmu::new(&text);
+    let u = |slave: &Slave| [slave.real("u.u_x"), slave.real("u.u_y")];
+    let slave = Slave::new(&fmu);
+    slave.ok((API.setup_experiment)(slave.component, 0, 0.0, 0.0, 0, 0.0));
+    slave.ok((API.enter_initialization_mode)(slave.component));
+    slave.set_inputs(&inputs(4));
+    assert_eq!(u(&slave), [1.5, 0.0], "initialization mode");
+    slave.ok((API.exit_initialization_mode)(slave.component));
+    assert_eq!(u(&slave), [1.5, 0.0], "before the inputs of the first step");
+    let mut filter = oracle(&fmu);
+    slave.set_inputs(&inputs(4));
+    let wanted = sample(&mut filter, 0.0, &inputs(4), true);
+    assert_eq!(u(&slave), wanted, "read before the first step");
+    assert_ne!(wanted, [1.5, 0.0]);
+    slave.step(0.0, 0.001);
+    assert_eq!(u(&slave), wanted, "and after it");
+    // The delay may be set by the importer too.
+    let prompt = Fmu::new(FILTER);
+    let told = Slave::new(&prompt);
+    told.set("actuation_delay", 0.001);
+    told.ok((API.setup_experiment)(told.component, 0, 0.0, 0.0, 0, 0.0));
+    told.ok((API.enter_initialization_mode)(told.component));
+    told.set_inputs(&inputs(4));
+    told.ok((API.exit_initialization_mode)(told.component));
+    assert_eq!(u(&told), [0.0, 0.0]);
+}
+
 #[test]
 fn reading_twice_gives_the_same() {
     let fmu = Fmu::new(FILTER);

@@ -15,9 +15,9 @@ fn workshop() -> Workshop {
 fn every_example_configuration_is_built() {
     let workshop = Workshop::with_library();
     for (stem, says) in [
-        ("unicycle-filter", "Fixed-time safety filter for a unicycle with 42 variables"),
+        ("unicycle-filter", "Fixed-time safety filter for a unicycle with 43 variables"),
         ("unicycle-plant", "Reference plant: unicycle with 11 variables"),
-        ("escort-filter", "Fixed-time safety filter for a point mass in the plane with 67 variables"),
+        ("escort-filter", "Fixed-time safety filter for a point mass in the plane with 68 variables"),
         ("escort-plant", "Reference plant: point mass in the plane with 11 variables"),
         ("tour-controller", "Nominal controller (waypoints) for a unicycle with 20 variables"),
     ] {
@@ -50,7 +50,7 @@ fn both_versions_of_fmi() {
     let said = workshop.punctual(["build", "filter.toml", "-o", "x.fmu", "--fmi", "both"]).success();
     let says = "Fixed-time safety filter for a unicycle with";
     let wanted = format!(
-        "x.fmu: {says} 42 variables, guid {{GUID}}\nx-fmi3.fmu: {says} 43 variables, guid {{GUID}}\n"
+        "x.fmu: {says} 43 variables, guid {{GUID}}\nx-fmi3.fmu: {says} 44 variables, guid {{GUID}}\n"
     );
     assert_eq!(without_guids(&said), wanted);
     // The one of 2.0 is the same as without the option.

@@ -28,13 +28,15 @@ enum Order {
     Jacobi,
 }
 
-/// The filter of examples/vehicles/unicycle-filter.toml.
-fn filter() -> Filter {
+/// The filter of examples/vehicles/unicycle-filter.toml. In Jacobi order the master tells it that its input acts a step late.
+fn filter(order: Order) -> Filter {
     let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0).expect("a disc");
     let settings = BarrierSettings::within(10.0).margin(0.02);
     let builder = Filter::builder(Unicycle).barrier("goal", goal, settings);
     let sampling = Sampling::Measured { first: Some(STEP) };
-    builder.and_then(|b| b.sampling(sampling)).and_then(|b| b.build()).expect("a filter")
+    let delay = if order == Order::Jacobi { STEP } else { 0.0 };
+    let builder = builder.and_then(|b| b.sampling(sampling)).and_then(|b| b.actuation_delay(delay));
+    builder.and_then(|b| b.build()).expect("a filter")
 }
 
 /// The values compared, row by row: state, input of the plant, h.
@@ -54,11 +56,12 @@ impl Rows {
 }
 
 fn in_process(order: Order) -> Rows {
-    let mut filter = filter();
+    let mut filter = filter(order);
     let mut rows = Rows::default();
     let mut x = [0.0; 4];
     // The last result of the filter, and h of that sample. In Jacobi order these are still read when the
-    // plant is at the next point. Before the first step, both come from looking ahead at the start.
+    // plant is at the next point. Before the first step, h comes from looking ahead at the start, and the input is what
+    // the filter assumes to act before its first sample.
     let mut last = [0.0; 2];
     let mut sample = |time: f64, x: &[f64; 4]| {
         // The nominal controller: damping, a = −v.
@@ -74,6 +77,9 @@ fn in_process(order: Order) -> Rows {
         let (u, h) = if order == Order::Jacobi && k == STEPS { (last, last_h) } else { sample(time, &x) };
         if k == 0 || order == Order::GaussSeidel {
             (last, last_h) = (u, h);
+        }
+        if k == 0 && order == Order::Jacobi {
+            last = [0.0; 2];
         }
         rows.push(&x, &last, last_h);
         x = rk4_step(&Unicycle, &x, &last, STEP);

@@ -37,7 +37,7 @@ fn the_json_tells_the_same() {
     assert_eq!(report["default_experiment"]["step_size"], 0.001);
     assert_eq!(report["problems"], Value::Array(vec![]));
     let variables = report["variables"].as_array().expect("a list");
-    assert_eq!(variables.len(), 42);
+    assert_eq!(variables.len(), 43);
     let deadline = variables.iter().find(|v| v["name"] == "goal.deadline").expect("the deadline");
     assert_eq!((&deadline["unit"], &deadline["causality"]), (&"s".into(), &"parameter".into()));
     assert_eq!((&deadline["start"], &deadline["min"]), (&"10.0".into(), &1e-9.into()));

@@ -21,6 +21,7 @@ mod identifying;
 mod in_process;
 mod inspecting;
 mod judging;
+mod late;
 mod merging;
 mod misbehaving;
 mod mistakes;

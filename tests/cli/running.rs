@@ -72,13 +72,14 @@ fn fewer_rows_and_chosen_signals() {
     assert_eq!(table.column("time"), [0.0, 0.004, 0.008, 0.01], "the last point is always there");
 }
 
-/// The filter's outputs depend directly on its inputs. In Gauss–Seidel order the sample of t_k acts from t_k on;
+/// The filter's outputs depend directly on its inputs. It is told nothing here (tests/cli/late.rs). In Gauss–Seidel order the sample of t_k acts from t_k on;
 /// in Jacobi order from t_{k+1} on.
 #[test]
 fn jacobi_order_is_one_step_late() {
     let short = ("stop_time = 20.0", "stop_time = 0.05");
     let prompt = recorded(&[short], "");
-    let late = recorded(&[short, ("step = 0.001", "order = \"jacobi\"\nstep = 0.001")], "");
+    let untold = ("fmu = \"filter.fmu\"", "fmu = \"filter.fmu\"\nstart = { actuation_delay = 0.0 }");
+    let late = recorded(&[short, ("step = 0.001", "order = \"jacobi\"\nstep = 0.001"), untold], "");
     for table in [&prompt, &late] {
         assert_eq!(table.column("filter.u.a"), table.column("plant.u.a"));
     }

@@ -361,7 +361,9 @@ impl Campaign {
         check_fed(&system, &refer, &connected, &given).map_err(|e| e.in_file(system_path))?;
         let CampaignSection { runs, seed, sampling, success, .. } = section;
         let sampler = Sampler::new(sampling, seed, runs, varied.len()).map_err(in_file)?;
-        let notes = coupling::unit_notes(&system, &refer, &connected);
+        let late = coupling::delays(&system, &refer, &connected);
+        let mut notes = coupling::unit_notes(&system, &refer, &connected);
+        notes.extend(late.warnings.into_iter().chain(late.notes));
         Ok(Self { source, system, models, varied, sampling, sampler, seed, runs, success, notes })
     }
 

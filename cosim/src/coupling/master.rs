@@ -22,6 +22,7 @@ use std::time::{Duration, Instant};
 use punctual_fmu::configuration::Configuration;
 use punctual_fmu::text::number;
 
+use super::delays;
 use super::grid::Grid;
 use super::interference::{self, Interference};
 use super::layout::{Choice, Layout, Recorder};
@@ -275,6 +276,11 @@ impl<P: Participant> Simulation<P> {
                 Column { name: format!("{component}.{}", variable.name), unit: variable.unit.clone() }
             })
             .collect();
+        // How late the inputs of filters act, which a filter may be told.
+        let late = delays::of(system, descriptions, &links);
+        for (component, reference, delay) in late.starts {
+            starts[component].push(Start::real(reference, delay));
+        }
         // Make the participants.
         let mut members = Vec::new();
         for (component, [mut states, mut direct, mut inputs, others]) in groups.into_iter().enumerate() {
@@ -300,7 +306,9 @@ impl<P: Participant> Simulation<P> {
         // first.
         let mut standing: Vec<String> =
             members.iter().filter_map(|member| remark(&member.participant)).collect();
+        standing.extend(late.warnings);
         let warnings = standing.len();
+        standing.extend(late.notes);
         if system.experiment().order == Order::GaussSeidel {
             standing.extend(notes);
         }

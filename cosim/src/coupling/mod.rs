@@ -2,6 +2,7 @@
 //! master runs them and records. It knows FMUs only through [`crate::host`], and steps any [`Participant`].
 
 mod alone;
+mod delays;
 mod graph;
 mod grid;
 mod in_process;
@@ -17,6 +18,7 @@ mod system;
 
 pub use crate::host::Participant;
 pub use alone::alone;
+pub(crate) use delays::of as delays;
 pub use grid::Grid;
 pub use in_process::InProcess;
 pub use interference::Interference;

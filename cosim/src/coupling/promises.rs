@@ -316,7 +316,7 @@ const STATE: &str = "x";
 const WANTED: &str = "u_ref";
 
 /// Whether a variable belongs to the group `all`, as `x.v` or as an array element `x[2]`.
-fn is_of(name: &str, all: &str) -> bool {
+pub(super) fn is_of(name: &str, all: &str) -> bool {
     name.strip_prefix(all).is_some_and(|rest| rest.starts_with(['.', '[']))
 }
 

@@ -451,6 +451,13 @@ impl System {
         Ok(self)
     }
 
+    /// The same system in this order.
+    #[must_use]
+    pub fn ordered(mut self, order: Order) -> Self {
+        self.experiment.order = order;
+        self
+    }
+
     /// The same system with `signals` recorded at every step, and no pictures.
     #[must_use]
     pub fn recording(mut self, signals: Vec<String>) -> Self {

@@ -98,6 +98,11 @@ pub(super) fn page(product: &Product, described: &Described, canonical: &str) ->
             SamplingName::Measured | SamplingName::StepSize => PREDICTED,
         };
         given += if c.is_assured() { ASSURED } else { ROWS };
+        if c.actuation_delay > 0.0 {
+            given += &late(c.actuation_delay);
+        } else if c.may_be_late() {
+            given += PROMPT;
+        }
         given += if c.external().is_some() { EXTERNAL } else { "" };
     }
     let experiment = product.configuration.experiment();
@@ -136,6 +141,18 @@ to cover what that costs.</p>";
 
 const PREDICTED: &str = "\n<p>Between samples the input is held. The filter predicts the state over that time, and adds to \
 the margin what the hold still costs.</p>";
+
+const PROMPT: &str = "\n<p><code>actuation_delay</code> is 0: the promise holds where <code>u.*</code> acts in the step of its \
+sample. For a Jacobi master set this parameter to the communication step, or build with <code>--master jacobi</code>.</p>";
+
+/// What a filter with a delay says of it, in s.
+fn late(delay: f64) -> String {
+    format!(
+        "\n<p>The promise holds where <code>u.*</code> acts {delay} s after its sample (<code>actuation_delay</code>), as with a \
+         master that exchanges all values before a step of that length (Jacobi). Until the inputs of the first step are set, \
+         <code>u.*</code> is what is assumed to act before: the admissible input nearest 0.</p>"
+    )
+}
 
 const ASSURED: &str = "\n<p>The filter promises only what a plan within the bounds keeps, whatever <code>u_ref.*</code> is. \
 <code>assurance</code> says whether it has one.</p>";

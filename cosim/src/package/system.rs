@@ -13,7 +13,7 @@ use punctual_modeldescription::{
     VariableKind,
 };
 
-use crate::coupling::{self, Link, Port, StartValue, System};
+use crate::coupling::{self, Link, Order, Port, StartValue, System};
 use crate::error::Error;
 use crate::host::{Array, DataType, Description, Family, Fmu, Variable};
 use crate::text;
@@ -39,14 +39,17 @@ pub struct Packed {
     pub notes: Vec<String>,
 }
 
-/// Packs the system at `path` into `file`, in this version of SSP.
+/// Packs the system at `path` into `file`, in this version of SSP. The package is for a master of this order; by default for that
+/// of the system. It gives each filter that is then a step late the start value of its `actuation_delay`.
 ///
 /// # Errors
 ///
 /// A system file that cannot be used, an FMU that is missing or cannot be used, an array that the version
 /// cannot represent, a file that cannot be written.
-pub fn pack(path: &Path, file: &Path, version: SspVersion) -> Result<Packed, Error> {
+pub fn pack(path: &Path, file: &Path, version: SspVersion, order: Option<Order>) -> Result<Packed, Error> {
     let system = System::read(path)?;
+    let order = order.unwrap_or(system.experiment().order);
+    let system = system.ordered(order);
     let base = path.parent().unwrap_or(Path::new(""));
     let name = path.file_stem().map_or_else(|| "system".into(), |stem| stem.to_string_lossy());
     let (archive, packed) = archive(&system, &name, base, version).map_err(|e| e.in_file(path))?;
@@ -147,7 +150,16 @@ fn archive(
     if version == SspVersion::One {
         refuse_arrays(system, &descriptions, &links)?;
     }
-    let parameters = start_values(system, &descriptions, version)?;
+    let mut parameters = start_values(system, &descriptions, version)?;
+    let late = coupling::delays(system, &descriptions, &links);
+    for (component, reference, delay) in &late.starts {
+        let variables = &descriptions[*component].variables;
+        let told = variables.iter().find(|v| v.value_reference == *reference && v.of == DataType::Float64);
+        parameters.extend(told.map(|variable| {
+            let name = format!("{}.{}", system.components()[*component].name, variable.name);
+            Parameter::scalar(name, ParameterValue::Real(*delay))
+        }));
+    }
     let connections = connections(system, &descriptions, &links)?;
     let starts = &parameters;
     let experiment = system.experiment();
@@ -185,12 +197,7 @@ fn archive(
     let structure = SystemStructure {
         version,
         name: name.to_owned(),
-        description: match experiment.tolerance {
-            None => format!("coupled with a communication step of {} s", experiment.step),
-            Some(tolerance) => {
-                format!("coupled with a communication step of {} s, tolerance {tolerance:e}", experiment.step)
-            }
-        },
+        description: described(system),
         generation_tool: concat!("Punctual ", env!("CARGO_PKG_VERSION")).to_owned(),
         start_values: (!parameters.is_empty()).then(|| START_VALUES.to_owned()),
         components,
@@ -207,8 +214,8 @@ fn archive(
         fmus: store.fmus.len(),
         connections: structure.connections.len(),
         start_values: parameters.len(),
-        warnings: store.warnings.clone(),
-        notes: coupling::unit_notes(system, &descriptions, &links),
+        warnings: store.warnings.iter().cloned().chain(late.warnings).collect(),
+        notes: coupling::unit_notes(system, &descriptions, &links).into_iter().chain(late.notes).collect(),
     };
     // Pack.
     let broken = |e: punctual_modeldescription::Error| super::broken(&e);
@@ -222,6 +229,19 @@ fn archive(
         archive.add(&place, bytes).map_err(broken)?;
     }
     Ok((archive, packed))
+}
+
+/// How the system is coupled, in words. SSP has no element for it.
+fn described(system: &System) -> String {
+    let experiment = system.experiment();
+    let mut text = format!("coupled with a communication step of {} s", experiment.step);
+    if let Some(tolerance) = experiment.tolerance {
+        text += &format!(", tolerance {tolerance:e}");
+    }
+    text + match experiment.order {
+        Order::GaussSeidel => "",
+        Order::Jacobi => ", by a master that exchanges all values before it steps (Jacobi)",
+    }
 }
 
 /// The array that a scalar is an element of.

@@ -131,6 +131,16 @@ impl FilterBlock {
         }
     }
 
+    /// Writes the admissible input nearest 0.
+    fn write_rest(&self, values: &mut Values) {
+        for i in 0..self.layout.inputs {
+            let name = self.configuration.plant.input_name(i);
+            let [min, max] = self.configuration.bounds.get(name).copied().unwrap_or_default();
+            // Not `clamp`, which panics if the bounds contradict each other.
+            values.reals[self.layout.outputs + i] = 0.0_f64.max(min).min(max);
+        }
+    }
+
     /// Writes the number of each enumeration to its code.
     fn write_codes(&self, values: &mut Values) {
         for (code, &of) in (self.layout.end..).zip(&self.enumerated) {
@@ -198,6 +208,14 @@ impl Block for FilterBlock {
         if rising {
             let restored = self.filter.restore(&self.kept);
             debug_assert!(restored.is_ok(), "{restored:?}");
+        }
+    }
+
+    /// A master that is a step late hands this on for the first step, so with a delay it has to be what the filter assumes to
+    /// act until the input of its first sample does.
+    fn begin(&self, values: &mut Values) {
+        if self.configuration.actuation_delay > 0.0 {
+            self.write_rest(values);
         }
     }
 
@@ -323,12 +341,7 @@ impl Block for FilterBlock {
 
     fn show_refusal(&self, values: &mut Values) {
         let (outputs, inputs) = (self.layout.outputs, self.layout.inputs);
-        for i in 0..inputs {
-            let name = self.configuration.plant.input_name(i);
-            let [min, max] = self.configuration.bounds.get(name).copied().unwrap_or_default();
-            // Not `clamp`, which panics if the bounds contradict each other.
-            values.reals[outputs + i] = 0.0_f64.max(min).min(max);
-        }
+        self.write_rest(values);
         if let Some(input) = self.filter.integrated_input() {
             values.reals[outputs + input] = self.filter.integrated();
         }

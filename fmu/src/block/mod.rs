@@ -94,6 +94,9 @@ pub trait Block: Send {
     /// Writes the outputs for the inputs at time `t` (s), without remembering anything.
     fn output(&mut self, t: f64, values: &mut Values);
 
+    /// Replaces in the outputs what acts before the first step and its inputs, where that is not what [`Self::output`] wrote.
+    fn begin(&self, _values: &mut Values) {}
+
     /// Writes to `derivative` the change along `direction` of the real outputs that [`Self::output`] would
     /// write. `direction` has a number for every real input; both are indexed by variables. `derivative` is
     /// initially zero. Nothing is remembered.

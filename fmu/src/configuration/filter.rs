@@ -231,8 +231,8 @@ pub(super) static SECTION: Section = Section {
                 "actuation_delay",
                 Number(Is("s"), Range::NON_NEGATIVE),
                 Some("0"),
-                "at most the step size: until a computed input acts, such as a step with a Jacobi master. The state is \
-                 predicted over it",
+                "at most the step size: until a computed input acts, such as a step with a [Jacobi master](fmu.md#jacobi), for \
+                 which `build --master jacobi` and `run` set it. The state is predicted over it",
             ),
             Key::new(
                 "period_max",
@@ -534,7 +534,60 @@ impl FilterConfiguration {
         rows.push(Parameter::new(names, "s", Range::NON_NEGATIVE, description, |c: &mut Self| {
             Some(&mut c.arm_after)
         }));
+        if self.may_be_late() {
+            let names = ("actuation_delay".to_owned(), "actuation_delay".to_owned());
+            let description = "time until u acts, at most a step: a step with a master that exchanges all values first (Jacobi)";
+            rows.push(Parameter::new(names, "s", Range::NON_NEGATIVE, description, |c: &mut Self| {
+                Some(&mut c.actuation_delay)
+            }));
+        }
         rows
+    }
+
+    /// Whether the filter can account for an [`actuation_delay`](Self::actuation_delay): not behind an integrator, with a barrier
+    /// that it cannot predict, or where rows alone account for errors of measurement.
+    pub fn may_be_late(&self) -> bool {
+        let errs = !self.measurement_errors.is_empty() && !self.is_assured();
+        self.integrator.is_none() && self.external().is_none() && !errs
+    }
+
+    /// The same filter for a master that exchanges all values before it steps (Jacobi), so that an input acts one step after its
+    /// sample: its `actuation_delay` is the step size, unless the file gives a longer one.
+    ///
+    /// # Errors
+    ///
+    /// A delay that is shorter than a step and not 0; a filter that accounts for no delay; with `assurance = "on"`, what no plan
+    /// accounts for.
+    pub fn for_jacobi(mut self) -> Result<Self, ConfigurationError> {
+        let (delay, step) = (self.actuation_delay, self.experiment.step_size);
+        let refuse = |message: String| Err(ConfigurationError::new("actuation_delay", message));
+        if delay >= step {
+            return Ok(self);
+        }
+        if delay > 0.0 {
+            return refuse(format!(
+                "is {} s, must be at least the step of {} s for a Jacobi master, which hands an input on one step after its \
+                 sample; without the key it is that step",
+                number(delay),
+                number(step)
+            ));
+        }
+        if !self.may_be_late() {
+            return refuse(format!(
+                "is 0, must be the step of {} s for a Jacobi master, and this filter accounts for no delay: leave out {}, or use a \
+                 master that lets the filter act at once (Gauss-Seidel)",
+                number(step),
+                match (&self.integrator, self.external()) {
+                    (Some(_), _) => "[integrator]",
+                    (None, Some(_)) => "the external barriers",
+                    (None, None) => "[measurement_errors], for which the rows alone account here",
+                }
+            ));
+        }
+        self.actuation_delay = step;
+        let rows = self.examine()?;
+        self.completed(rows)?;
+        Ok(self)
     }
 
     fn sampling(&self, step_size: f64) -> Sampling {

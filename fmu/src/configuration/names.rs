@@ -30,7 +30,7 @@ pub(super) enum Named {
 }
 
 /// Names, and first parts of names, of the FMU's own variables.
-const RESERVED: [(&str, &[Named]); 16] = {
+const RESERVED: [(&str, &[Named]); 17] = {
     const BOTH: &[Named] = &[Named::Barrier, Named::Parameter];
     [
         ("x", BOTH),
@@ -41,6 +41,7 @@ const RESERVED: [(&str, &[Named]); 16] = {
         ("status", BOTH),
         ("status_code", BOTH),
         ("arm_after", BOTH),
+        ("actuation_delay", BOTH),
         ("rearm", BOTH),
         ("integrator", BOTH),
         ("measurement_error", BOTH),
