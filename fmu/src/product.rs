@@ -432,8 +432,8 @@ fn plant_variables(c: &PlantConfiguration) -> (Table, Layout) {
         table.signal("u", input, "", Causality::Input);
     }
     let outputs = table.variables.len();
-    let reported = c.output_signals();
-    let parameters = outputs + states.len() + reported.len();
+    let (reported, least) = (c.output_signals(), c.least_signals());
+    let parameters = outputs + states.len() + reported.len() + least.len();
     for (i, state) in states.iter().enumerate() {
         let variable = table.signal("x", state, "", Causality::Output);
         variable.dependencies = Some(Vec::new());
@@ -450,6 +450,9 @@ fn plant_variables(c: &PlantConfiguration) -> (Table, Layout) {
             let all = parameters..parameters + rows.len();
             variable.initial_dependencies = Some(all.map(|i| i as u32).collect());
         }
+    }
+    for barrier in &least {
+        table.signal("least_h", barrier, "least ", Causality::Output).dependencies = Some(Vec::new());
     }
     let layout = Layout { states: states.len(), inputs: inputs.len(), outputs, ..Layout::default() };
     table.finish(c, &rows, layout)

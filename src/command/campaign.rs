@@ -467,11 +467,12 @@ fn text(report: &Report, summary: &Summary) -> String {
     }));
     let worst = output::table(&rows, &[true, true, false]);
     let made = made(report);
+    let fates: String = summary.declared.iter().map(|of| format!("{}\n\n", of.text())).collect();
     let again = summary.worst.first().map_or_else(String::new, |case| {
         format!("\n\nagain, with pictures: punctual replay {} --run {} --out out", report.file, case.run)
     });
     format!(
-        "{} runs{made}\n\n{parts}\n\n{spreads}\n\nthe worst\n{worst}\n\nwritten: {}{again}",
+        "{} runs{made}\n\n{parts}\n\n{spreads}\n\nthe worst\n{worst}\n\n{fates}written: {}{again}",
         summary.runs,
         std::iter::once(&report.file).chain(&report.report).cloned().collect::<Vec<_>>().join("\n         ")
     )

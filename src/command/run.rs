@@ -52,6 +52,10 @@ pub struct Arguments {
     /// List the signals too: unit, least, greatest and final value
     #[arg(long)]
     signals: bool,
+    /// Let the plant, the filter's own model, deviate from it at the ends of what the filter declares, as this seed draws: up to
+    /// 2^53. It replaces `simulated` and `disturbance` of a filter's file
+    #[arg(long, value_name = "SEED", value_parser = clap::value_parser!(u64).range(..=1 << 53))]
+    uncertainty: Option<u64>,
     /// What every barrier of every filter has to fulfil, else the exit code is 1
     #[arg(long, value_enum, value_name = "WHAT", default_value_t = Requirement::Unbroken)]
     require: Requirement,
@@ -162,6 +166,7 @@ fn isolated(arguments: &Arguments) -> Result<ExitCode, Error> {
     words.extend(arguments.units.then(|| "--units".into()));
     words.extend(arguments.json.then(|| "--json".into()));
     words.extend(arguments.signals.then(|| "--signals".into()));
+    words.extend(arguments.uncertainty.map(|seed| format!("--uncertainty={seed}").into()));
     words.extend(["--require".into(), arguments.require.word().into()]);
     words.extend(["--watched".into(), child.folder().into(), "--".into(), arguments.system.clone().into()]);
     let (how, last) = match child.run(words, Voice::Loud, None)? {
@@ -207,12 +212,19 @@ fn open(arguments: &Arguments) -> Result<Opened, Error> {
     let text = text::read(path)?;
     if FileKind::of(&text) != Some(FileKind::One) {
         let system = System::parse(&text)?;
-        let (simulation, models) =
+        let (mut simulation, mut models) =
             Simulation::new(&system, path.parent().unwrap_or(Path::new("")), package::read_configuration)?;
+        if let Some(seed) = arguments.uncertainty {
+            coupling::draw(&system, &mut models, seed, "--uncertainty")?;
+            simulation = Simulation::of(&system, &models)?;
+        }
         models.iter().filter_map(Model::stale).for_each(|note| output::note(&note));
         return Ok(Opened { system, models, simulation, out, filter: None });
     }
-    let configuration = package::read_configuration(path)?;
+    let mut configuration = package::read_configuration(path)?;
+    if arguments.uncertainty.is_some() {
+        coupling::as_the_model(&mut configuration);
+    }
     let filter = match &configuration {
         Configuration::Filter(filter) => Some(Box::new(filter.clone())),
         _ => None,
@@ -220,7 +232,10 @@ fn open(arguments: &Arguments) -> Result<Opened, Error> {
     let (text, configurations) = coupling::alone(configuration)?;
     let system = System::parse(&text)?;
     let own = |configuration| Own::new(configuration).map(|own| Model::Own(Box::new(own), path.to_owned()));
-    let models = configurations.into_iter().map(own).collect::<Result<Vec<_>, _>>()?;
+    let mut models = configurations.into_iter().map(own).collect::<Result<Vec<_>, _>>()?;
+    if let Some(seed) = arguments.uncertainty {
+        coupling::draw(&system, &mut models, seed, "--uncertainty")?;
+    }
     let simulation = Simulation::of(&system, &models)?;
     let out = Some(out.unwrap_or_else(|| stem(path).into()));
     Ok(Opened { system, models, simulation, out, filter })

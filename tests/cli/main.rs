@@ -11,6 +11,7 @@ mod bad_systems;
 mod building;
 mod campaigns;
 mod checking;
+mod declared;
 mod demonstrating;
 mod failing;
 mod fmi3;

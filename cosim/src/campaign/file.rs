@@ -5,7 +5,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use punctual_fmu::configuration::{
-    Configuration, ConfigurationError, FileKind, Range, read_toml, write_toml,
+    Configuration, ConfigurationError, Deviation, DeviationKind, FileKind, Range, read_toml, write_toml,
 };
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserializer, MapAccess, Visitor};
@@ -15,7 +15,7 @@ use uuid::Uuid;
 use super::distribution::{Distribution, VarySection};
 use super::part::Part;
 use super::sampling::{MAX_RUNS, Sampler, Sampling};
-use crate::coupling::{self, Grid, Sequence, Simulation, StartValue, System, check_fed, links, port};
+use crate::coupling::{self, Grid, Role, Sequence, Simulation, StartValue, System, check_fed, links, port};
 use crate::error::Error;
 use crate::host::{Causality, DataType, Variability};
 use crate::package;
@@ -75,10 +75,24 @@ struct CampaignSection {
     /// Condition for a successful run; default kept.
     #[serde(default)]
     success: Success,
+    /// Whether plants deviate from the model; default not.
+    #[serde(default)]
+    uncertainty: Uncertainty,
     /// Stop time in s, in place of the system's.
     stop_time: Option<f64>,
     /// Communication step in s, in place of the system's.
     step: Option<f64>,
+}
+
+/// Whether the plants of a campaign deviate from the filter's model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Uncertainty {
+    /// They do not: each is as the system says.
+    #[default]
+    None,
+    /// Each is drawn within what the filter declares: `[uncertainty]`, `[measurement_errors]` and `actuation_delay`.
+    Declared,
 }
 
 /// Conditions for a successful run.
@@ -171,6 +185,8 @@ pub struct Campaign {
     seed: u64,
     runs: u64,
     success: Success,
+    /// The filters whose plants deviate.
+    declared: Vec<Declared>,
     notes: Vec<String>,
 }
 
@@ -205,7 +221,10 @@ impl Campaign {
                 let text = text::read(&system_path)?;
                 if FileKind::of(&text) == Some(FileKind::One) {
                     let own = |e: Error| e.in_file(&system_path);
-                    let configuration = package::read_configuration(&system_path)?;
+                    let mut configuration = package::read_configuration(&system_path)?;
+                    if file.campaign.uncertainty == Uncertainty::Declared {
+                        coupling::as_the_model(&mut configuration);
+                    }
                     let (system, configurations) = coupling::alone(configuration).map_err(own)?;
                     let configurations =
                         configurations.iter().map(Configuration::canonical).collect::<Result<_, _>>()?;
@@ -301,9 +320,15 @@ impl Campaign {
         })?;
         // The components, from their configurations.
         let components = source.configurations.iter().zip(system.components());
-        let models = components
+        let mut models = components
             .map(|(text, component)| Part::of(text, component, system_path))
             .collect::<Result<Vec<_>, Error>>()?;
+        let declared = match section.uncertainty {
+            Uncertainty::None => Vec::new(),
+            Uncertainty::Declared => {
+                deviating(&system, &mut models, &file.vary).map_err(|e| e.in_file(path))?
+            }
+        };
         let refer: Vec<_> = models.iter().map(Part::description).collect();
         let connected = links(&system, &refer).map_err(|e| e.in_file(system_path))?;
         // The varied variables.
@@ -359,12 +384,40 @@ impl Campaign {
             }
         }
         check_fed(&system, &refer, &connected, &given).map_err(|e| e.in_file(system_path))?;
+        // How each plant deviates is drawn after what the file varies, so that this stays the same.
+        for Declared { plant: component, .. } in &declared {
+            for (name, distribution) in [
+                (Deviation::SEED, Distribution::Seed),
+                (
+                    Deviation::KIND,
+                    Distribution::Choice(DeviationKind::ALL.map(|kind| f64::from(kind as u8)).into()),
+                ),
+            ] {
+                let description = refer[*component];
+                let Some(variable) = description.index_of(name).map(|i| &description.variables[i]) else {
+                    continue;
+                };
+                varied.push(Varied {
+                    name: format!("{}.{name}", system.components()[*component].name),
+                    unit: variable.unit.clone(),
+                    description: variable.description.clone(),
+                    component: *component,
+                    reference: variable.value_reference,
+                    tunable: false,
+                    distribution,
+                });
+            }
+        }
         let CampaignSection { runs, seed, sampling, success, .. } = section;
         let sampler = Sampler::new(sampling, seed, runs, varied.len()).map_err(in_file)?;
         let late = coupling::delays(&system, &refer, &connected);
         let mut notes = coupling::unit_notes(&system, &refer, &connected);
         notes.extend(late.warnings.into_iter().chain(late.notes));
-        Ok(Self { source, system, models, varied, sampling, sampler, seed, runs, success, notes })
+        notes.extend(declared.iter().map(|declared| {
+            let [filter, plant] = [declared.filter, declared.plant].map(|c| &system.components()[c].name);
+            format!("{plant} is the model of {filter} and deviates from it in each run, as drawn within what {filter} declares")
+        }));
+        Ok(Self { source, system, models, varied, sampling, sampler, seed, runs, success, declared, notes })
     }
 
     /// The texts it is made of.
@@ -407,6 +460,11 @@ impl Campaign {
         &self.notes
     }
 
+    /// The filters whose plants are drawn within what they declare.
+    pub fn declared(&self) -> &[Declared] {
+        &self.declared
+    }
+
     /// The condition for a successful run.
     pub fn success(&self) -> Success {
         self.success
@@ -420,6 +478,10 @@ impl Campaign {
     /// A seed that is varied but is not that of a plant's `[disturbance]`; a period that is varied; a start
     /// time or step that does not fit the periods.
     pub(super) fn piece(&self) -> Result<Option<u64>, Error> {
+        if !self.declared.is_empty() {
+            let message = "is \"declared\", must be \"none\" for --rare, which draws from [vary] and the noise of plants alone";
+            return Err(Error::configuration("campaign.uncertainty", message));
+        }
         let experiment = self.system.experiment();
         let mut periods = Vec::new();
         for varied in self.varied.iter().filter(|varied| matches!(varied.distribution, Distribution::Seed)) {
@@ -543,6 +605,56 @@ impl Campaign {
         };
         simulation.set_sequences(self.varied.iter().filter_map(sequence).collect());
     }
+}
+
+/// A filter whose plant is drawn within what the filter declares.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Declared {
+    /// Position of the filter among the components.
+    pub filter: usize,
+    /// Position of its plant.
+    pub plant: usize,
+    /// Whether its outputs are read a step late.
+    pub late: bool,
+    /// Whether the input of a sample acts later than that sample.
+    pub delayed: bool,
+}
+
+/// Lets the plants of all filters that declare something deviate within that.
+///
+/// # Errors
+///
+/// No filter declares anything; a filter without plans; a plant that is not the filter's model alone; a declared number that
+/// differs from run to run, or is given by the system.
+fn deviating(
+    system: &System,
+    models: &mut [Part],
+    vary: &BTreeMap<String, VarySection>,
+) -> Result<Vec<Declared>, Error> {
+    let found = {
+        let configurations: Vec<_> = models.iter().map(Part::configuration).collect();
+        let descriptions: Vec<_> = models.iter().map(Part::description).collect();
+        coupling::deviations(system, &descriptions, &configurations)
+            .map_err(|message| Error::configuration("campaign.uncertainty", message))?
+    };
+    let mut declared = Vec::new();
+    for coupling::Drawn { filter, plant, configuration, late, delayed } in found {
+        for (component, role) in [(filter, Role::Filter), (plant, Role::Plant)] {
+            let name = &system.components()[component].name;
+            let is_fixed = |key: &&String| {
+                let variable = key.strip_prefix(name.as_str()).and_then(|rest| rest.strip_prefix('.'));
+                variable.is_some_and(|variable| !coupling::may_differ(role, variable))
+            };
+            if let Some(key) = vary.keys().find(is_fixed) {
+                let message = "cannot be varied where `campaign.uncertainty` is \"declared\": the plant is drawn within what the file of \
+                               the filter states";
+                return Err(Error::configuration(format!("vary.{key:?}"), message));
+            }
+        }
+        models[plant] = Part::Own(Box::new(coupling::Own::new(Configuration::Plant(configuration))?));
+        declared.push(Declared { filter, plant, late, delayed });
+    }
+    Ok(declared)
 }
 
 /// The error for a name under `vary` that has dots but no quotes, which TOML reads as nested tables.

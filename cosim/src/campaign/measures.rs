@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use punctual_core::filter::{AssuranceStatus, Status};
+use punctual_core::filter::{AssuranceStatus, Phase, Status};
 use punctual_fmu::configuration::Configuration;
 
 use super::file::{Campaign, Choice, Success};
@@ -18,6 +18,18 @@ struct FilterPlan {
     /// Whether it follows backup plans.
     assured: bool,
     barriers: Vec<BarrierPlan>,
+    /// How its promise is judged, if its plant is drawn within what it declares.
+    declared: Option<DeclaredPlan>,
+}
+
+/// How the promise of a filter is judged whose plant is drawn.
+struct DeclaredPlan {
+    /// The name of the plant.
+    plant: String,
+    /// Whether its outputs are read a step late.
+    late: bool,
+    /// Whether the phase in its report is that of an instant after the sample.
+    delayed: bool,
 }
 
 /// A barrier of a filter.
@@ -42,6 +54,100 @@ struct Seen {
     assurance_statuses: [u64; AssuranceStatus::ALL.len()],
     /// Largest magnitude of each input.
     peaks: Vec<f64>,
+    /// What was promised of each barrier, if the plant is drawn within what is declared.
+    promised: Vec<Promised>,
+    /// The number of communication points seen.
+    points: u64,
+}
+
+/// What a filter promised of a barrier, and what became of it at every instant.
+#[derive(Clone, Debug)]
+struct Promised {
+    /// Whether a plan guaranteed it, as read at the last communication points; the latest first.
+    guaranteed: [bool; READ],
+    /// Whether h ≥ 0 was required from then on, as read there.
+    required: [bool; READ],
+    /// Whether it was ever guaranteed.
+    given: bool,
+    /// Whether it was guaranteed at all samples since, until it was released.
+    stays: bool,
+    /// The least h of the plant as it is while it was guaranteed and required.
+    least: Option<f64>,
+    /// The largest size of h.
+    size: f64,
+}
+
+/// The number of communication points whose reports are remembered.
+const READ: usize = 3;
+
+/// Part of the largest size of h by which h may lie below 0: what the integration of the plant may be off by.
+const TOLERANCE: f64 = 1e-7;
+
+/// What became of the promise of a filter whose plant was drawn within what it declares.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Fate {
+    /// No plan was found at the start, so nothing was promised.
+    Refused,
+    /// Guaranteed at every sample, and h ≥ 0 at every instant at which that was required.
+    Kept,
+    /// The guarantee was withdrawn, and h ≥ 0 as long as there was one.
+    Withdrawn,
+    /// h < 0 while a plan guaranteed h ≥ 0.
+    Broken,
+}
+
+impl Fate {
+    pub(super) const ALL: [Self; 4] = [Self::Refused, Self::Kept, Self::Withdrawn, Self::Broken];
+
+    /// Its word in a row.
+    pub(super) fn word(self) -> &'static str {
+        match self {
+            Self::Refused => "refused",
+            Self::Kept => "kept",
+            Self::Withdrawn => "withdrawn",
+            Self::Broken => "broken",
+        }
+    }
+}
+
+impl Promised {
+    fn nothing() -> Self {
+        let none = [false; READ];
+        Self { guaranteed: none, required: none, given: false, stays: true, least: None, size: 0.0 }
+    }
+
+    /// Takes the values of a communication point: whether a plan guarantees it, its phase, and the least h over the step before.
+    fn see(&mut self, [guaranteed, phase, least]: [f64; 3], of: &DeclaredPlan, is_first: bool) {
+        let is = |of: Phase| phase == f64::from(of as i32);
+        let is_guaranteed = guaranteed != 0.0;
+        self.given |= is_guaranteed;
+        self.stays &= is_guaranteed || !self.given || is(Phase::Released);
+        self.size = self.size.max(least.abs());
+        self.guaranteed.rotate_right(1);
+        self.required.rotate_right(1);
+        (self.guaranteed[0], self.required[0]) = (is_guaranteed, is(Phase::Stay) || is(Phase::Left));
+        // The sample at the start of the step before is read here, or was at the point before. The phase is of a later instant
+        // with a delay, and then that of the sample before it is of one before the step.
+        let at = usize::from(!of.late);
+        if !is_first && self.guaranteed[at] && self.required[at + usize::from(of.delayed)] {
+            self.least = Some(self.least.map_or(least, |before| before.min(least)));
+        }
+    }
+
+    fn is_broken(&self) -> bool {
+        // What is no number is broken.
+        self.least.is_some_and(|least| !(least >= -TOLERANCE * self.size))
+    }
+}
+
+/// What became of all promises of a filter.
+fn fate(promised: &[Promised]) -> Fate {
+    match () {
+        () if promised.iter().any(Promised::is_broken) => Fate::Broken,
+        () if !promised.iter().any(|of| of.given) => Fate::Refused,
+        () if promised.iter().all(|of| of.stays) => Fate::Kept,
+        () => Fate::Withdrawn,
+    }
 }
 
 impl Measures {
@@ -63,6 +169,13 @@ impl Measures {
             filters.push(FilterPlan {
                 component: component.name.clone(),
                 assured: filter.is_assured(),
+                declared: campaign.declared().iter().find(|declared| declared.filter == c).map(|declared| {
+                    DeclaredPlan {
+                        plant: campaign.system().components()[declared.plant].name.clone(),
+                        late: declared.late,
+                        delayed: declared.delayed,
+                    }
+                }),
                 inputs: filter
                     .plant
                     .inputs()
@@ -106,6 +219,13 @@ impl Measures {
             signals.push(format!("{}.status", filter.component));
             signals.extend(filter.assured.then(|| format!("{}.assurance", filter.component)));
             signals.extend(filter.inputs.iter().map(|(name, _)| format!("{}.u.{name}", filter.component)));
+            if let Some(DeclaredPlan { plant, .. }) = &filter.declared {
+                for BarrierPlan { name, .. } in &filter.barriers {
+                    let of_plant = name.strip_prefix(&filter.component).unwrap_or(name);
+                    signals.extend(["guaranteed", "phase"].map(|field| format!("{name}.{field}")));
+                    signals.push(format!("{plant}.least_h{of_plant}"));
+                }
+            }
         }
         signals
     }
@@ -143,6 +263,11 @@ impl Measures {
             counts: [0; Status::ALL.len()],
             assurance_statuses: [0; AssuranceStatus::ALL.len()],
             peaks: vec![0.0; filter.inputs.len()],
+            promised: vec![
+                Promised::nothing();
+                if filter.declared.is_some() { filter.barriers.len() } else { 0 }
+            ],
+            points: 0,
         };
         self.filters.iter().map(nothing).collect()
     }
@@ -158,6 +283,14 @@ impl Measures {
                 *peak = peak.max(u.abs());
             }
             values = values.get(seen.peaks.len()..).unwrap_or_default();
+            if let Some(declared) = &filter.declared {
+                for promised in &mut seen.promised {
+                    let Some((of_barrier, rest)) = values.split_first_chunk() else { break };
+                    promised.see(*of_barrier, declared, seen.points == 0);
+                    values = rest;
+                }
+            }
+            seen.points += 1;
         }
     }
 
@@ -174,14 +307,23 @@ impl Measures {
         row.extend([Cell::Count(number), Cell::Count(choice.seed)]);
         row.extend(choice.values.iter().map(|value| Cell::Number(Some(*value))));
         let verdict = row.len();
-        for (filter, Seen { counts, assurance_statuses, peaks }) in self.filters.iter().zip(seen) {
+        for (filter, Seen { counts, assurance_statuses, peaks, promised, .. }) in
+            self.filters.iter().zip(seen)
+        {
             row.extend(counts.iter().map(|count| Cell::Count(*count)));
             row.extend(assurance_statuses.iter().filter(|_| filter.assured).map(|count| Cell::Count(*count)));
             row.extend(peaks.iter().map(|peak| Cell::Number(Some(*peak))));
-            for plan in &filter.barriers {
+            if filter.declared.is_some() {
+                let fate = fate(promised);
+                success &= fate == Fate::Kept;
+                row.push(Cell::Text(Some(fate.word().to_owned())));
+            }
+            for (i, plan) in filter.barriers.iter().enumerate() {
                 let promise = promises.iter().find(|promise| promise.barrier == plan.name);
                 let kept = promise.is_some_and(Promise::kept);
                 success &= match self.success {
+                    // The filter sees the plant with the errors of its measurement. The promise is of the plant as it is.
+                    _ if filter.declared.is_some() => true,
                     Success::Kept => kept,
                     Success::OnTimeAndInside => promise.is_some_and(|p| p.promise == Kept::Kept),
                 };
@@ -197,6 +339,7 @@ impl Measures {
                     Cell::Number(promise.map(|p| p.violation)),
                     Cell::Flag(failure.is_none() && kept),
                 ]);
+                row.extend(promised.get(i).map(|of| Cell::Number(of.least)));
             }
         }
         let failure = Cell::Text(failure.map(ToString::to_string));
@@ -213,6 +356,12 @@ fn count(counts: &mut [u64], values: &mut &[f64]) {
         *count += 1;
     }
 }
+
+/// The column of the [`Fate`] of a filter's promise.
+pub(super) const FATE: &str = "promise";
+
+/// The column of the least h of a barrier while it was guaranteed.
+pub(super) const GUARANTEED: &str = "least_guaranteed_h";
 
 /// Columns of a barrier, in the order of a row; `[h]` stands for its unit.
 const OF_BARRIER: [(&str, Kind, &str, &str); 10] = [
@@ -260,10 +409,18 @@ fn columns(campaign: &Campaign, filters: &[FilterPlan]) -> Vec<Column> {
             let meaning = format!("largest size of u.{input} at a communication point");
             add(format!("{}.peak.{input}", filter.component), Kind::Number, unit, &meaning);
         }
+        if filter.declared.is_some() {
+            let meaning = "what became of the promise, with a plant within what is declared: refused, kept, withdrawn or broken";
+            add(format!("{}.{FATE}", filter.component), Kind::Text, "", meaning);
+        }
         for barrier in &filter.barriers {
             for (field, kind, unit, meaning) in OF_BARRIER {
                 let unit = if unit == "[h]" { &barrier.unit } else { unit };
                 add(format!("{}.{field}", barrier.name), kind, unit, meaning);
+            }
+            if filter.declared.is_some() {
+                let meaning = "least h of the plant as it is, at any instant, while a plan guaranteed h >= 0";
+                add(format!("{}.{GUARANTEED}", barrier.name), Kind::Number, &barrier.unit, meaning);
             }
         }
     }

@@ -21,12 +21,12 @@ mod summary;
 mod table;
 
 pub use distribution::{Distribution, VarySection};
-pub use file::{Campaign, Choice, Source, Success, Varied};
+pub use file::{Campaign, Choice, Declared, Source, Success, Uncertainty, Varied};
 pub use join::join;
 pub use measures::Measures;
 pub use part::Part;
 pub use rare::{Ended, Failing, Rare, Value, rare};
 pub use runner::{Options, Progress, kept, recorded, run, runs, version};
 pub use sampling::{Sampler, Sampling};
-pub use summary::{Case, Lack, Rate, Spread, Summary, summary};
+pub use summary::{Case, Fates, Lack, Rate, Spread, Summary, summary};
 pub use table::{Cell, Column, GROUP, Kind, Reader, Row};

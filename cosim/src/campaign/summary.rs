@@ -3,9 +3,10 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
+use punctual_fmu::text::number;
 use serde::Serialize;
 
-use super::measures::Measures;
+use super::measures::{FATE, Fate, Measures};
 use super::table::{Cell, Column, Kind, Reader};
 use crate::error::Error;
 
@@ -127,8 +128,50 @@ pub struct Summary {
     pub lacks: Vec<Lack>,
     /// The spreads of the columns with numbers.
     pub spreads: Vec<Spread>,
+    /// What became of the promise of each filter whose plant was drawn within what it declares.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub declared: Vec<Fates>,
     /// The worst runs, the worst first.
     pub worst: Vec<Case>,
+}
+
+/// How many runs had which outcome for the promise of a filter whose plant was drawn within what it declares.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Fates {
+    /// The filter.
+    pub filter: String,
+    /// Runs in which a plan was found at the start, so that something was promised.
+    pub promised: u64,
+    /// Runs guaranteed at every sample, with h ≥ 0 at every instant at which that was required.
+    pub kept: u64,
+    /// Runs in which the guarantee was withdrawn, with h ≥ 0 as long as there was one.
+    pub withdrawn: u64,
+    /// Runs in which h < 0 although a plan guaranteed h ≥ 0. There should be none.
+    pub broken: u64,
+    /// The most that there may be in infinitely many runs, as a part of those promised, at a confidence of 95 %; `None` if
+    /// nothing was promised.
+    pub broken_at_most: Option<f64>,
+}
+
+impl Fates {
+    fn of(filter: &str, counts: [u64; Fate::ALL.len()]) -> Self {
+        let [_, kept, withdrawn, broken] = counts;
+        let promised = kept + withdrawn + broken;
+        let broken_at_most = (promised > 0).then(|| Rate::of(broken, promised).interval[1]);
+        Self { filter: filter.to_owned(), promised, kept, withdrawn, broken, broken_at_most }
+    }
+
+    /// The counts as a sentence.
+    pub fn text(&self) -> String {
+        let Self { filter, promised, kept, withdrawn, broken, broken_at_most } = self;
+        let most = broken_at_most.map(|most| {
+            format!(" (of infinitely many at most {} %, with a confidence of 95 %)", number(100.0 * most))
+        });
+        format!(
+            "{filter}: {promised} promised; with plants within what is declared {kept} kept, {withdrawn} withdrawn, {broken} broken{}",
+            most.unwrap_or_default()
+        )
+    }
 }
 
 /// Reads the rows from `reader` once, and keeps the `worst` so many.
@@ -145,6 +188,9 @@ pub fn summary(reader: &Reader, measures: &Measures, worst: usize) -> Result<Sum
     let of_kind = |kind: Kind| (0..columns.len()).filter(move |&c| columns[c].kind == kind);
     let flags: Vec<usize> = of_kind(Kind::Flag).filter(|&c| columns[c].name != "success").collect();
     let numbers: Vec<usize> = of_kind(Kind::Number).collect();
+    let of_filter = |c: &usize| columns[*c].name.strip_suffix(FATE).and_then(|name| name.strip_suffix('.'));
+    let fates: Vec<(usize, &str)> = of_kind(Kind::Text).filter_map(|c| Some((c, of_filter(&c)?))).collect();
+    let mut counts = vec![[0_u64; Fate::ALL.len()]; fates.len()];
     let [Some(success), Some(failure)] = ["success", "failure"].map(find) else {
         return Err(Error::configuration("", "a campaign without its columns"));
     };
@@ -159,6 +205,12 @@ pub fn summary(reader: &Reader, measures: &Measures, worst: usize) -> Result<Sum
             succeeded += u64::from(good);
             for (count, &c) in lacking.iter_mut().zip(&flags) {
                 *count += u64::from(matches!(row[c], Cell::Flag(false)));
+            }
+            for (counts, (c, _)) in counts.iter_mut().zip(&fates) {
+                let Cell::Text(Some(word)) = &row[*c] else { continue };
+                if let Some(fate) = Fate::ALL.iter().position(|fate| fate.word() == word) {
+                    counts[fate] += 1;
+                }
             }
             for (spread, &c) in spreads.iter_mut().zip(&numbers) {
                 if let Cell::Number(Some(value)) = row[c] {
@@ -195,6 +247,7 @@ pub fn summary(reader: &Reader, measures: &Measures, worst: usize) -> Result<Sum
             .map(|(&c, count)| Lack { column: columns[c].name.clone(), rate: Rate::of(count, runs) })
             .collect(),
         spreads: spreads.into_iter().map(Spread::finished).collect(),
+        declared: fates.iter().zip(counts).map(|((_, filter), counts)| Fates::of(filter, counts)).collect(),
         worst: heap.into_sorted_vec().into_iter().map(|kept| kept.0).collect(),
     })
 }

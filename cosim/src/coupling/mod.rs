@@ -3,6 +3,7 @@
 
 mod alone;
 mod delays;
+mod deviations;
 mod graph;
 mod grid;
 mod in_process;
@@ -19,6 +20,7 @@ mod system;
 pub use crate::host::Participant;
 pub use alone::alone;
 pub(crate) use delays::of as delays;
+pub use deviations::{Drawn, Role, as_the_model, deviations, draw, may_differ};
 pub use grid::Grid;
 pub use in_process::InProcess;
 pub use interference::Interference;

@@ -70,7 +70,7 @@ impl Disturbance {
 }
 
 /// A number in [−1, 1) that depends only on `key`.
-fn uniform(key: [u64; 4]) -> f64 {
+pub(super) fn uniform(key: [u64; 4]) -> f64 {
     let bits = key.into_iter().fold(0, |state, word| mixed(state ^ word));
     // 53 bits, as many as a double has.
     (bits >> 11) as f64 / (1_u64 << 52) as f64 - 1.0

@@ -1,6 +1,7 @@
 //! The computation of an FMU on arrays of values: a filter, a plant or a controller. No FMI, no pointers.
 
 mod controller;
+mod deviation;
 mod disturbance;
 mod filter;
 mod plant;
@@ -59,7 +60,8 @@ pub enum BlockState {
     },
     /// State of a plant.
     Plant {
-        /// The state, in the order and units of the model.
+        /// The state, in the order and units of the model. In a plant that deviates, its inputs follow: as asked before, and what
+        /// has arrived.
         x: Vec<f64>,
     },
     /// State of a controller.

@@ -3,6 +3,7 @@
 use punctual_core::dynamics::DynPlant;
 use punctual_models::Functions;
 
+use super::deviation::Deviating;
 use super::disturbance::Disturbance;
 use super::{Block, BlockState, Values, in_words};
 use crate::configuration::{ConfigurationError, Parameter, PlantConfiguration, PlantSection, updated};
@@ -20,6 +21,8 @@ pub(super) struct PlantBlock {
     /// Further outputs besides the states, if any.
     outputs: Option<Functions<f64>>,
     disturbance: Disturbance,
+    /// How it deviates from the model, if it does.
+    deviating: Option<Deviating>,
     /// Index of the disturbance's seed among the parameters, since it may change during a run.
     seed: Option<usize>,
     x: Vec<f64>,
@@ -27,6 +30,8 @@ pub(super) struct PlantBlock {
     next: Vec<f64>,
     /// Buffer: the inputs with their disturbance.
     u: Vec<f64>,
+    /// Buffer: what acts of the inputs of a plant that deviates.
+    acting: Vec<f64>,
 }
 
 impl PlantBlock {
@@ -35,10 +40,12 @@ impl PlantBlock {
         let outputs = configuration.outputs()?;
         let (x, u) = (vec![0.0; layout.states], vec![0.0; layout.inputs]);
         let disturbance = Disturbance::new(&configuration);
+        let deviating = configuration.deviation.as_deref().map(Deviating::new).transpose()?;
         let seed = parameters.iter().position(|parameter| parameter.tunable);
         Ok(Self {
             next: x.clone(),
             x,
+            acting: u.clone(),
             u,
             configuration,
             parameters,
@@ -46,6 +53,7 @@ impl PlantBlock {
             plant,
             outputs,
             disturbance,
+            deviating,
             seed,
         })
     }
@@ -116,9 +124,13 @@ impl Block for PlantBlock {
         self.plant = configuration.build()?;
         self.outputs = configuration.outputs()?;
         self.disturbance = Disturbance::new(&configuration);
+        self.deviating = configuration.deviation.as_deref().map(Deviating::new).transpose()?;
         self.configuration = configuration;
         // The first parameters are the initial state.
         self.x.copy_from_slice(&numbers[..self.layout.states]);
+        if let Some(deviating) = &mut self.deviating {
+            deviating.begin(self.configuration.experiment.start_time, &self.x);
+        }
         Ok(())
     }
 
@@ -129,6 +141,11 @@ impl Block for PlantBlock {
         measured.copy_from_slice(&self.x);
         if self.disturbance.affects_measurements() {
             self.disturbance.add_noise(seed, t, measured);
+        }
+        if let Some(deviating) = &self.deviating {
+            deviating.err(t, measured);
+            let (_, least) = others.split_at_mut(others.len() - deviating.least().len());
+            least.copy_from_slice(deviating.least());
         }
         if let Some(outputs) = &mut self.outputs {
             others.iter_mut().zip(outputs.at(t, |i| self.x[i])).for_each(|(to, value)| *to = value);
@@ -157,6 +174,9 @@ impl Block for PlantBlock {
         }
         self.next.copy_from_slice(&self.x);
         let (inner, mut k) = (h / substeps, 0.0);
+        if let Some(deviating) = &mut self.deviating {
+            deviating.begin_step(t, &self.next);
+        }
         while k < substeps {
             let held = if self.disturbance.affects_inputs() {
                 self.u.copy_from_slice(u);
@@ -165,7 +185,15 @@ impl Block for PlantBlock {
             } else {
                 u
             };
-            self.plant.rk4_step(&mut self.next, held, inner).map_err(|e| in_words(&e))?;
+            match &mut self.deviating {
+                None => self.plant.rk4_step(&mut self.next, held, inner).map_err(|e| in_words(&e))?,
+                Some(deviating) => {
+                    let time = (t + k * inner, k * inner, inner);
+                    let advance = |x: &mut [f64], u: &[f64]| self.plant.rk4_step(x, u, inner);
+                    let moved = deviating.advance(time, u, &mut self.next, &mut self.acting, advance);
+                    moved.map_err(|e| in_words(&e))?;
+                }
+            }
             k += 1.0;
         }
         if !self.next.iter().all(|v| v.is_finite()) {
@@ -175,6 +203,9 @@ impl Block for PlantBlock {
             return Err(self.lost_output(i, value, t, h));
         }
         std::mem::swap(&mut self.x, &mut self.next);
+        if let Some(deviating) = &mut self.deviating {
+            deviating.end_step(&values.reals[..self.layout.inputs]);
+        }
         self.output(t + h, values);
         Ok(())
     }
@@ -190,13 +221,18 @@ impl Block for PlantBlock {
             plant: _,
             outputs: _,
             disturbance: _,
+            deviating,
             seed: _,
             next: _,
             u: _,
+            acting: _,
         } = self;
         match state {
             BlockState::Plant { x } => x.clone_from(now),
             _ => *state = BlockState::Plant { x: now.clone() },
+        }
+        if let (BlockState::Plant { x }, Some(deviating)) = (state, deviating) {
+            x.extend_from_slice(deviating.memory());
         }
     }
 
@@ -204,10 +240,15 @@ impl Block for PlantBlock {
         let BlockState::Plant { x } = state else {
             return Err(state.mismatch("plant"));
         };
-        if x.len() != self.x.len() {
-            return Err(format!("the state has {} components, must have {}", x.len(), self.x.len()));
+        let states = self.x.len();
+        let length = states + self.deviating.as_ref().map_or(0, |deviating| deviating.memory().len());
+        if x.len() != length {
+            return Err(format!("the state has {} components, must have {length}", x.len()));
         }
-        self.x.copy_from_slice(x);
+        self.x.copy_from_slice(&x[..states]);
+        if let Some(deviating) = &mut self.deviating {
+            deviating.restore(&x[states..]);
+        }
         Ok(())
     }
 

@@ -46,9 +46,18 @@ impl FilterConfiguration {
             controller.functions::<f64>().map(|_| controller)
         });
         let (kind, name, experiment) = (PlantKind::Plant, "plant".to_owned(), self.experiment);
-        let output = Vec::new();
-        let plant =
-            PlantConfiguration { kind, name, plant, output, integration, disturbance, x0, experiment };
+        let (output, deviation) = (Vec::new(), None);
+        let plant = PlantConfiguration {
+            kind,
+            name,
+            plant,
+            output,
+            integration,
+            disturbance,
+            x0,
+            experiment,
+            deviation,
+        };
         Ok((plant.completed()?, controller.transpose()?))
     }
 

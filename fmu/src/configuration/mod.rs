@@ -11,6 +11,7 @@ mod apart;
 mod assurance;
 mod barrier;
 mod controller;
+mod deviation;
 mod external;
 mod file_kind;
 mod filter;
@@ -34,6 +35,7 @@ pub use barrier::{
     Automatic, BarrierSection, InfeasibleName, MethodName, Point, ProfileName, SHAPES, Shape, ShapeRow,
 };
 pub use controller::{Controller, ControllerConfiguration, ControllerName};
+pub use deviation::{Deviation, DeviationKind};
 pub use external::BarrierInput;
 pub use file_kind::FileKind;
 pub use filter::{FilterConfiguration, SamplingName};

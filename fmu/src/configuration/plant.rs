@@ -15,8 +15,8 @@ use super::model::RawModel;
 use super::names::{check_identifier, check_known, taken};
 use super::unit::measured;
 use super::{
-    ConfigurationError, EXPERIMENT, ExperimentSection, ModelName, Parameter, PlantSection, PluginLoader,
-    Range, VariableSection, check_unit, model,
+    ConfigurationError, Deviation, DeviationKind, EXPERIMENT, ExperimentSection, ModelName, Parameter,
+    PlantSection, PluginLoader, Range, VariableSection, check_unit, model,
 };
 
 const INNER_STEP: Range = Range::POSITIVE;
@@ -231,6 +231,9 @@ pub struct PlantConfiguration {
     pub x0: BTreeMap<String, f64>,
     /// The run that it is meant for.
     pub experiment: ExperimentSection,
+    /// How the plant deviates from its model in a test of a promise. No file says so.
+    #[serde(skip)]
+    pub deviation: Option<Box<Deviation>>,
 }
 
 impl PlantConfiguration {
@@ -251,8 +254,8 @@ impl PlantConfiguration {
         }
         check_identifier("name", &name)?;
         let plant = PlantSection::parse(plant, loader)?;
-        Self { kind: PlantKind::Plant, name, plant, output, integration, disturbance, x0, experiment }
-            .completed()
+        let (kind, deviation) = (PlantKind::Plant, None);
+        Self { kind, name, plant, output, integration, disturbance, x0, experiment, deviation }.completed()
     }
 
     /// Completes and checks what has a valid name and plant.
@@ -297,6 +300,20 @@ impl PlantConfiguration {
             |c: &mut Self| Some(&mut c.integration.inner_step),
         ));
         rows.extend(self.disturbance.as_ref().map(|d| self.disturbance_parameters(d)).into_iter().flatten());
+        if self.deviation.is_some() {
+            let row = |name: &str, range, meaning: &str, access: fn(&mut Deviation) -> &mut f64| {
+                let names = (name.to_owned(), name.to_owned());
+                Parameter::new(names, "1", range, meaning, move |c: &mut Self| {
+                    c.deviation.as_deref_mut().map(access)
+                })
+            };
+            let kinds = "how the plant deviates within what the filter declares: 1 constant, 2 changing, 3 at its ends";
+            let last = DeviationKind::ALL.len() as f64;
+            rows.push(row(Deviation::SEED, SEED, "seed of how the plant deviates", |d| &mut d.seed));
+            rows.push(row(Deviation::KIND, Range { min: Some(1.0), max: Some(last) }, kinds, |d| {
+                &mut d.kind
+            }));
+        }
         rows
     }
 
@@ -364,6 +381,19 @@ impl PlantConfiguration {
             }
         }
         Ok(())
+    }
+
+    /// The least h of each barrier over the last step, for a plant that deviates.
+    pub fn least_signals(&self) -> Vec<VariableSection> {
+        let barriers = self.deviation.iter().flat_map(|of| &of.filter.barrier);
+        let signal = |barrier: &super::BarrierSection| VariableSection {
+            name: barrier.name.clone(),
+            unit: barrier.unit(&self.plant),
+            description: format!("h of {} at the state as it is, over the last step", barrier.name),
+            min: None,
+            max: None,
+        };
+        barriers.map(signal).collect()
     }
 
     /// The outputs as signals, in order.

@@ -401,6 +401,9 @@ fn head(file: &str, campaign: &Campaign, summary: &Summary) -> String {
     });
     let experiment = campaign.system().experiment();
     let wanted = match campaign.success() {
+        _ if !campaign.declared().is_empty() => {
+            "a plan guarantees every promise at every sample, and h >= 0 while it does"
+        }
         Success::Kept => "every promise is kept and every sample meets its constraint",
         Success::OnTimeAndInside => "every barrier is reached by its deadline and not left from then on",
     };
@@ -433,6 +436,9 @@ fn head(file: &str, campaign: &Campaign, summary: &Summary) -> String {
         percent(low),
         percent(high),
     );
+    for of in &summary.declared {
+        html += &format!("<p>{}.</p>\n", escape(&of.text()));
+    }
     let row = |name: String, rate: &Rate| {
         let [low, high] = rate.interval.map(percent);
         vec![escape(&name), rate.count.to_string(), percent(rate.rate), format!("{low} to {high}")]

@@ -1,0 +1,225 @@
+//! `campaign.uncertainty = "declared"`: plants drawn within what a filter declares.
+
+use punctual_cosim::campaign::Cell;
+use punctual_cosim::coupling::{self, Drawn, Model, Own, Simulation, System};
+use punctual_fmu::configuration::Configuration;
+use serde_json::Value;
+
+use crate::campaigns::rows;
+use crate::table::Table;
+use crate::workshop::{Workshop, examples};
+
+const FILTER: &str = r#"
+kind = "filter"
+assurance = "on"
+plant.model = "point_mass"
+bounds = { u_x = [-4.0, 4.0], u_y = [-4.0, 4.0] }
+x0 = { v_x = 1.0 }
+u_ref = { u_x = "3 - v_x", u_y = "0" }
+uncertainty = { rates = { v_x = 0.05, v_y = 0.05 }, inputs.u_x = { gain = [0.95, 1.05], lag = [0.0, 0.02] } }
+measurement_errors = { x_p = 0.01, y_p = 0.01 }
+experiment = { step_size = 0.05, stop_time = 8.0 }
+[[barrier]]
+name = "goal"
+centre = [8.0, 3.0]
+radius = 2.0
+deadline = 6.0
+[[barrier]]
+name = "rock"
+shape = "obstacle"
+centre = [4.0, 0.5]
+radius = 1.0
+"#;
+
+fn campaign(runs: u64, more: &str) -> String {
+    format!(
+        "system = \"filter.toml\"\n[campaign]\nruns = {runs}\nseed = 3\nuncertainty = \"declared\"\n{more}"
+    )
+}
+
+fn workshop(filter: &str, campaign: &str) -> Workshop {
+    let workshop = Workshop::new();
+    workshop.write("filter.toml", filter);
+    workshop.write("c.toml", campaign);
+    workshop
+}
+
+/// The column `name` of all rows, as text.
+fn column(workshop: &Workshop, name: &str) -> Vec<String> {
+    let (names, rows) = rows(&workshop.path("c.parquet"));
+    let at = names.iter().position(|n| n == name).unwrap_or_else(|| panic!("no {name} in {names:?}"));
+    let text = |cell: &Cell| match cell {
+        Cell::Number(Some(number)) => format!("{number:?}"),
+        Cell::Text(Some(text)) => text.clone(),
+        Cell::Count(count) => count.to_string(),
+        other => format!("{other:?}"),
+    };
+    rows.iter().map(|row| text(&row[at])).collect()
+}
+
+/// Every plant within what is declared keeps what is promised, whatever kind is drawn. Each run is made again bit for bit.
+#[test]
+fn a_promise_holds_for_every_plant_that_is_drawn() {
+    let workshop = workshop(FILTER, &campaign(9, ""));
+    let done = workshop.punctual(["campaign", "c.toml", "--json"]);
+    assert!(
+        done.stderr.contains("note: plant is the model of filter and deviates from it in each run"),
+        "{done:#?}"
+    );
+    let report: Value = serde_json::from_str(&done.success()).expect("JSON");
+    let fates = &report["declared"][0];
+    assert_eq!(
+        (&fates["filter"], &fates["promised"], &fates["broken"]),
+        (&"filter".into(), &9.into(), &0.into())
+    );
+    assert_eq!((&fates["kept"], &fates["withdrawn"]), (&9.into(), &0.into()), "{report:#}");
+    assert_eq!(column(&workshop, "filter.promise"), vec!["kept"; 9]);
+    let mut kinds = column(&workshop, "plant.uncertainty.kind");
+    let seeds = column(&workshop, "seed").into_iter().map(|seed| format!("{seed}.0"));
+    assert_eq!(column(&workshop, "plant.uncertainty.seed"), seeds.collect::<Vec<_>>());
+    kinds.sort_unstable();
+    kinds.dedup();
+    assert_eq!(kinds, ["1.0", "2.0", "3.0"]);
+    for barrier in ["goal", "rock"] {
+        let least = column(&workshop, &format!("filter.{barrier}.least_guaranteed_h"));
+        assert!(least.iter().all(|h| h.parse().is_ok_and(|h: f64| h >= 0.0)), "{least:?}");
+        let mut different = least.clone();
+        different.sort_unstable();
+        different.dedup();
+        assert_eq!(different.len(), least.len(), "each plant differs: {least:?}");
+    }
+    let text = workshop.punctual(["campaign", "c.toml"]).success();
+    assert!(
+        text.contains(
+            "filter: 9 promised; with plants within what is declared 9 kept, 0 withdrawn, 0 broken"
+        ),
+        "{text}"
+    );
+    for run in ["0", "4"] {
+        let again = workshop.punctual(["replay", "c.parquet", "--run", run, "--out", "out"]).success();
+        assert!(again.contains("the row is as recorded, bit for bit"), "{again}");
+    }
+}
+
+/// The draws go as far as they are declared: plants that do ten times as much as the filter knows lose its promises.
+#[test]
+fn plants_that_do_more_than_is_declared_lose_the_promise() {
+    let Configuration::Filter(filter) = Configuration::parse(FILTER).expect("a filter") else {
+        panic!("no filter")
+    };
+    let (text, configurations) = coupling::alone(Configuration::Filter(filter)).expect("a system");
+    let system = System::parse(&text).expect("a system");
+    let own = |configuration| {
+        let own = Own::new(configuration).expect("a component");
+        Model::Own(Box::new(own), "filter.toml".into())
+    };
+    let mut models: Vec<_> = configurations.into_iter().map(own).collect();
+    let mut lost = |times: f64, seed: u64| {
+        let (of, descriptions): (Vec<_>, Vec<_>) =
+            models.iter().map(|m| (m.configuration(), m.description())).unzip();
+        let drawn = coupling::deviations(&system, &descriptions, &of).expect("a plant to draw");
+        let [Drawn { plant, configuration, .. }] = &drawn[..] else { panic!("one plant") };
+        let mut configuration = configuration.clone();
+        let deviation = configuration.deviation.as_mut().expect("a plant that deviates");
+        deviation.rates.iter_mut().for_each(|rate| *rate *= times);
+        deviation.seed = seed as f64;
+        // The plant is the model again for the next one.
+        let nominal = std::mem::replace(&mut models[*plant], own(Configuration::Plant(configuration)));
+        let mut simulation = Simulation::of(&system, &models).expect("a system that runs");
+        let outcome = simulation.run(|_, _| ()).expect("a run");
+        models[*plant] = nominal;
+        outcome.promises.iter().any(|promise| promise.guaranteed == Some(false))
+    };
+    assert_eq!((0..3).filter(|seed| lost(1.0, *seed)).count(), 0);
+    assert_eq!((0..3).filter(|seed| lost(10.0, *seed)).count(), 3);
+}
+
+#[test]
+fn what_is_declared_cannot_be_varied() {
+    let vary = "[vary.\"filter.uncertainty.rate.v_x\"]\ndistribution = \"choice\"\nvalues = [0.005]\n";
+    let workshop = workshop(FILTER, &campaign(6, vary));
+    workshop.punctual(["campaign", "c.toml"]).fails(
+        2,
+        "c.toml: vary.\"filter.uncertainty.rate.v_x\": cannot be varied where `campaign.uncertainty` is \"declared\": the plant is drawn \
+         within what the file of the filter states",
+    );
+}
+
+/// A run at the ends of what is declared: the input, the rates and the measurements differ, and h of the plant as it is is recorded.
+#[test]
+fn a_run_at_the_ends_of_what_is_declared() {
+    let workshop = workshop(FILTER, &campaign(1, ""));
+    let run = |seed: &str| {
+        let done = workshop.punctual(["run", "filter.toml", "--out", "out", "--uncertainty", seed]);
+        assert_eq!(done.code, 0, "{done:#?}");
+        workshop.text("out/filter.csv")
+    };
+    let (one, again, other) = (run("1"), run("1"), run("2"));
+    assert!(one == again && one != other);
+    let table = Table::parse(&one);
+    let (least, seen) = (table.column("plant.least_h.rock"), table.column("filter.rock.h"));
+    assert_eq!(least.len(), seen.len());
+    // h falls by less than 0.3 m in a step of 50 ms, and a measurement is off by at most 1.5 cm.
+    assert!(least.iter().zip(&seen).all(|(least, seen)| (least - seen).abs() < 0.3), "{least:?}, {seen:?}");
+    assert!(least.iter().skip(1).zip(&seen).any(|(least, seen)| least != seen));
+    let nominal = workshop.punctual(["run", "filter.toml", "--out", "nominal"]);
+    assert_eq!(nominal.code, 0, "{nominal:#?}");
+    assert!(!workshop.text("nominal/filter.csv").contains("least_h"));
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused() {
+    let refused = |filter: &str, file: &str, message: &str| {
+        let workshop = workshop(filter, file);
+        workshop
+            .punctual(["campaign", "c.toml"])
+            .fails(2, &format!("c.toml: campaign.uncertainty: {message}"));
+    };
+    let nothing =
+        FILTER.lines().filter(|line| !line.starts_with("uncertainty") && !line.starts_with("measurement"));
+    refused(
+        &nothing.collect::<Vec<_>>().join("\n"),
+        &campaign(1, ""),
+        "has no plant to draw: no filter of the system declares [uncertainty], [measurement_errors] or actuation_delay",
+    );
+    let rows = FILTER.replace("\"on\"", "\"off\"").replace("uncertainty = {", "# {");
+    refused(
+        &rows,
+        &campaign(1, ""),
+        "has no plant to draw within what filter declares: no plans are followed, which alone account for it: assurance is \"off\"",
+    );
+    let workshop = workshop(FILTER, &campaign(1, ""));
+    workshop.write("c.toml", campaign(1, "success = \"on_time_and_inside\"\n"));
+    let rare = workshop.punctual(["campaign", "c.toml", "--rare"]);
+    let message = "error: campaign.uncertainty: is \"declared\", must be \"none\" for --rare, which draws from [vary] and the noise of \
+                   plants alone\n";
+    assert!(rare.code == 2 && rare.stderr.ends_with(message), "{rare:#?}");
+    workshop.write("c.toml", campaign(1, "").replace("\"declared\"", "\"some\""));
+    workshop
+        .punctual(["campaign", "c.toml"])
+        .fails(2, "c.toml: campaign.uncertainty: is \"some\", must be \"none\" or \"declared\"");
+    workshop.write("plant.toml", "kind = \"plant\"\nplant.model = \"unicycle\"\n");
+    workshop.write(
+        "c.toml",
+        campaign(1, "").replace("system = \"filter.toml\"\n", "")
+            + "[system.experiment]\nstop_time = 1.0\nstep = 0.05\n\
+               [[system.component]]\nname = \"filter\"\nfmu = \"filter.toml\"\n\
+               start = { \"x.x_p\" = 0.0, \"x.y_p\" = 0.0, \"x.v_x\" = 0.0, \"x.v_y\" = 0.0 }\n\
+               [[system.component]]\nname = \"plant\"\nfmu = \"plant.toml\"\nstart = { \"u.omega\" = 0.0 }\n\
+               [[system.connection]]\nfrom = \"filter.u.u_x\"\nto = \"plant.u.a\"\n",
+    );
+    workshop.punctual(["campaign", "c.toml"]).fails(
+        2,
+        "c.toml: campaign.uncertainty: has no plant to draw within what filter declares: plant is not the model of the filter, from which \
+         it would be drawn",
+    );
+}
+
+/// The example declares and simulates. The campaign draws in place of what it simulates.
+#[test]
+fn the_example_can_be_drawn() {
+    let windy = std::fs::read_to_string(examples().join("windy.toml")).expect("an example");
+    let workshop = workshop(&windy.replace("stop_time = 12.0", "stop_time = 1.0"), &campaign(2, ""));
+    workshop.punctual(["campaign", "c.toml"]).success();
+    assert_eq!(column(&workshop, "filter.promise"), ["kept", "kept"]);
+}
