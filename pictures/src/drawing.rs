@@ -377,6 +377,7 @@ fn path(picture: &PathPicture, outlines: &[Outline], recording: &Recording) -> R
             })
             .collect(),
         outlines: outlines.to_vec(),
+        tubes: Vec::new(),
     })
 }
 
@@ -408,6 +409,7 @@ fn time(picture: &TimePicture, recording: &Recording) -> Result<TimePlot, Error>
         instants: picture.deadline.iter().map(|&at| Mark { label: "deadline".to_owned(), at }).collect(),
         bounds: picture.bounds.iter().map(|&at| Mark { label: String::new(), at }).collect(),
         regions: Vec::new(),
+        bands: Vec::new(),
         scale: match picture.scale {
             Variant::Linear => Scale::Linear,
             Variant::Clipped => Scale::Percentiles(BULK.0, BULK.1),

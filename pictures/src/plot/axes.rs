@@ -68,19 +68,35 @@ impl Axes {
         if discs.is_empty() && outlines.is_empty() {
             return;
         }
-        let pixels = (self.area[2] - self.area[0]) / (self.x.high - self.x.low);
         canvas.clipped(self.area, |canvas| {
             for outline in outlines {
-                let rings = outline.rings.iter().map(|ring| ring.iter().map(|&[x, y]| self.place(x, y)));
-                let colour = set_colour(outline.obstacle);
-                canvas.area(rings, (colour, 0.18), Pen::solid(colour, 1.2));
+                self.outline(canvas, outline, (set_colour(outline.obstacle), 0.18));
             }
             for disc in discs {
-                let centre = self.place(disc.centre[0], disc.centre[1]);
-                let colour = set_colour(disc.obstacle);
-                canvas.circle(centre, disc.radius * pixels, (colour, 0.18), Pen::solid(colour, 1.2));
+                self.disc(canvas, disc, (set_colour(disc.obstacle), 0.18));
             }
         });
+    }
+
+    /// Draws the sets to keep out of again, over everything that is there.
+    pub(super) fn obstacles(&self, canvas: &mut Canvas, discs: &[Disc], outlines: &[Outline]) {
+        canvas.clipped(self.area, |canvas| {
+            for fill in [([255; 3], 1.0), (set_colour(true), 0.18)] {
+                outlines.iter().filter(|of| of.obstacle).for_each(|of| self.outline(canvas, of, fill));
+                discs.iter().filter(|of| of.obstacle).for_each(|of| self.disc(canvas, of, fill));
+            }
+        });
+    }
+
+    fn outline(&self, canvas: &mut Canvas, outline: &Outline, fill: ([u8; 3], f64)) {
+        let rings = outline.rings.iter().map(|ring| ring.iter().map(|&[x, y]| self.place(x, y)));
+        canvas.area(rings, fill, Pen::solid(set_colour(outline.obstacle), 1.2));
+    }
+
+    fn disc(&self, canvas: &mut Canvas, disc: &Disc, fill: ([u8; 3], f64)) {
+        let pixels = (self.area[2] - self.area[0]) / (self.x.high - self.x.low);
+        let centre = self.place(disc.centre[0], disc.centre[1]);
+        canvas.circle(centre, disc.radius * pixels, fill, Pen::solid(set_colour(disc.obstacle), 1.2));
     }
 
     /// Draws a curve, clipped to the rectangle and broken where a point has no position. With `steps`, it

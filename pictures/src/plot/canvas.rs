@@ -136,6 +136,19 @@ impl Canvas {
         self.add(filled(circle, fill.0, fill.1));
     }
 
+    /// The union of the areas within closed lines, filled as one, so that they do not darken each other. Each line has to run
+    /// in the same direction.
+    pub(super) fn union(&mut self, rings: &[Vec<Point>], colour: [u8; 3], opacity: f64) {
+        let ring = |points: &Vec<Point>| {
+            let points: Vec<_> =
+                points.iter().map(|(x, y)| format!("{} {}", rounded(*x), rounded(*y))).collect();
+            format!("M{}Z", points.join("L"))
+        };
+        let strokes =
+            Strokes::new().set("d", rings.iter().map(ring).collect::<String>()).set("fill-rule", "nonzero");
+        self.add(filled(strokes, colour, opacity));
+    }
+
     /// The area that an odd number of closed lines encloses, filled and then outlined.
     pub(super) fn area(
         &mut self,

@@ -55,6 +55,21 @@ pub struct PathPlot {
     pub discs: Vec<Disc>,
     /// Other sets beneath the paths.
     pub outlines: Vec<Outline>,
+    /// Tubes beneath the paths, above the sets.
+    pub tubes: Vec<Tube>,
+}
+
+/// What lies around a path: the boxes around its points, and everything between two of them.
+#[derive(Clone, Debug, Default)]
+pub struct Tube {
+    /// Legend entry; empty for none.
+    pub label: String,
+    /// The middle of each box, in the units of the axes; one that is not finite breaks the tube.
+    pub middles: Vec<[f64; 2]>,
+    /// Half the width of each box along both axes, ≥ 0, as many as `middles`.
+    pub halves: Vec<[f64; 2]>,
+    /// Index into [`PALETTE`]: that of the path around which it lies.
+    pub colour: usize,
 }
 
 /// A path: a start marker, a line, and a marker where it arrives.
@@ -124,6 +139,8 @@ pub struct TimePlot {
     pub y_label: String,
     /// The signals.
     pub series: Vec<Series>,
+    /// Bands beneath the signals.
+    pub bands: Vec<Band>,
     /// Vertical lines, such as a deadline.
     pub instants: Vec<Mark>,
     /// Horizontal lines, such as input bounds.
@@ -148,6 +165,23 @@ pub struct Series {
     /// Index into [`PALETTE`]; by default the index of the series. Give a reference and the signal that
     /// follows it the same colour.
     pub colour: Option<usize>,
+}
+
+/// The values between two signals.
+#[derive(Clone, Debug, Default)]
+pub struct Band {
+    /// Legend entry; empty for none.
+    pub label: String,
+    /// Times in seconds, increasing.
+    pub time: Vec<f64>,
+    /// The lower end at each time, in the unit of the axis, finite.
+    pub low: Vec<f64>,
+    /// The upper end at each time, as many as in `low`.
+    pub high: Vec<f64>,
+    /// Whether each value is held until the next time.
+    pub steps: bool,
+    /// Index into [`PALETTE`]: that of the signal around which it lies.
+    pub colour: usize,
 }
 
 /// Styles of a line. Styles without a line are only for charts.
@@ -254,6 +288,14 @@ pub fn chart(chart: &Chart, name: &str) -> Result<String, Error> {
     let mut canvas = Canvas::new(name, chart::WIDTH, chart.height());
     chart::draw(chart, &mut canvas).map_err(|message| Error::plot(File::new(name), message))?;
     Ok(canvas.document())
+}
+
+/// Opacity of a tube and of a band.
+const TUBE: f64 = 0.22;
+
+/// The legend entry of a tube or band in the colour with this index.
+fn tube_key(index: usize) -> legend::Key {
+    legend::Key::Patch(colour(index), TUBE, canvas::Pen::solid(colour(index), 0.0))
 }
 
 fn colour(index: usize) -> [u8; 3] {

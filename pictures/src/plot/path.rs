@@ -1,11 +1,11 @@
 //! Paths in a plane, drawn with equal axes.
 
 use super::axes::Axes;
-use super::canvas::{Anchor, Canvas, INK, Pen};
+use super::canvas::{Anchor, Canvas, INK, Pen, Point};
 use super::decimate::decimate;
 use super::legend::{self, Entry, Key};
 use super::scale::{Axis, extent};
-use super::{POINTS, PathPlot, Style, colour, set_colour};
+use super::{POINTS, PathPlot, Style, TUBE, Tube, colour, set_colour, tube_key};
 use crate::outlines::Outline;
 
 /// Size of the sheet in pixels.
@@ -25,14 +25,27 @@ pub(super) fn draw(plot: &PathPlot, canvas: &mut Canvas) -> Result<(), String> {
         plot.discs.iter().flat_map(move |d| [d.centre[axis] - d.radius, d.centre[axis] + d.radius])
     };
     let outlines = |axis: usize| plot.outlines.iter().flat_map(Outline::points).map(move |point| point[axis]);
-    let x = extent(plot.paths.iter().flat_map(|p| p.x.iter().copied()).chain(discs(0)).chain(outlines(0)));
-    let y = extent(plot.paths.iter().flat_map(|p| p.y.iter().copied()).chain(discs(1)).chain(outlines(1)));
+    let tubes = |axis: usize| {
+        let boxes = plot.tubes.iter().flat_map(|tube| tube.middles.iter().zip(&tube.halves));
+        boxes.flat_map(move |(middle, half)| [middle[axis] - half[axis], middle[axis] + half[axis]])
+    };
+    let sets = |axis: usize| discs(axis).chain(outlines(axis)).chain(tubes(axis));
+    let x = extent(plot.paths.iter().flat_map(|p| p.x.iter().copied()).chain(sets(0)));
+    let y = extent(plot.paths.iter().flat_map(|p| p.y.iter().copied()).chain(sets(1)));
     let axes = equal_axes([x, y], area)?;
     axes.frame(canvas, &plot.x_label, &plot.y_label, true);
     if !plot.title.is_empty() {
         canvas.text(&plot.title, ((area[0] + area[2]) / 2.0, 24.0), 16.0, Anchor::Middle, INK);
     }
     axes.sets(canvas, &plot.discs, &plot.outlines);
+    for tube in &plot.tubes {
+        let rings = around(tube, &axes);
+        canvas.clipped(area, |canvas| canvas.union(&rings, colour(tube.colour), TUBE));
+    }
+    // What has to be kept out of covers the corners of boxes that reach into it: the tube itself does not.
+    if !plot.tubes.is_empty() {
+        axes.obstacles(canvas, &plot.discs, &plot.outlines);
+    }
     for (i, path) in plot.paths.iter().enumerate() {
         let pen = pen(i, path.style);
         let kept = decimate(&[&path.x, &path.y], POINTS);
@@ -52,6 +65,55 @@ pub(super) fn draw(plot: &PathPlot, canvas: &mut Canvas) -> Result<(), String> {
     Ok(())
 }
 
+/// The most boxes of a tube that are drawn.
+const BOXES: usize = 300;
+
+/// The outlines of a tube on the sheet: for each two boxes, one after the other, the least convex area that holds both.
+fn around(tube: &Tube, axes: &Axes) -> Vec<Vec<Point>> {
+    let boxes: Vec<_> = tube.middles.iter().zip(&tube.halves).collect();
+    let every = boxes.len().div_ceil(BOXES).max(1);
+    // A box that is left out lies between those around it, up to what a path bends over so few steps.
+    let kept = (0..boxes.len()).filter(|k| k % every == 0 || k + 1 == boxes.len());
+    let corners = |k: usize| {
+        let (middle, half) = boxes[k];
+        [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+            .map(|[x, y]| axes.place(middle[0] + x * half[0], middle[1] + y * half[1]))
+    };
+    let kept: Vec<_> = kept
+        .map(corners)
+        .filter(|box_of| box_of.iter().all(|(x, y)| x.is_finite() && y.is_finite()))
+        .collect();
+    match &kept[..] {
+        [one] => vec![hull(one.to_vec())],
+        several => several.windows(2).map(|two| hull(two.concat())).collect(),
+    }
+}
+
+/// The convex hull of `points`, always in the same direction: A. M. Andrew, Inf. Process. Lett. 9 (1979), doi
+/// 10.1016/0020-0190(79)90072-3.
+fn hull(mut points: Vec<Point>) -> Vec<Point> {
+    points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    points.dedup();
+    let half = |points: &mut dyn Iterator<Item = Point>| {
+        let mut side: Vec<Point> = Vec::new();
+        for point in points {
+            let turns = |side: &[Point]| {
+                let [a, b] = [side[side.len() - 2], side[side.len() - 1]];
+                (b.0 - a.0) * (point.1 - a.1) - (b.1 - a.1) * (point.0 - a.0)
+            };
+            while side.len() > 1 && turns(&side) <= 0.0 {
+                side.pop();
+            }
+            side.push(point);
+        }
+        side.pop();
+        side
+    };
+    let mut ring = half(&mut points.iter().copied());
+    ring.extend(half(&mut points.iter().rev().copied()));
+    ring
+}
+
 fn pen(i: usize, style: Style) -> Pen {
     let dash = (style == Style::Dashed).then_some((7.0, 5.0));
     Pen { colour: colour(i), width: 2.0, dash }
@@ -61,6 +123,9 @@ fn entries(plot: &PathPlot) -> Vec<Entry> {
     let mut entries: Vec<Entry> = Vec::new();
     for (i, path) in plot.paths.iter().enumerate().filter(|(_, path)| !path.label.is_empty()) {
         entries.push((Key::Line(pen(i, path.style)), path.label.clone()));
+    }
+    for tube in plot.tubes.iter().filter(|tube| !tube.label.is_empty()) {
+        entries.push((tube_key(tube.colour), tube.label.clone()));
     }
     if !plot.paths.is_empty() {
         entries.push((Key::Start, "start".to_owned()));
@@ -112,6 +177,44 @@ mod tests {
         );
         assert!((x - y).abs() < 1e-9, "{x} {y}");
         assert!(axes.x.low < 0.0 && axes.x.high > 47.0);
+    }
+
+    #[test]
+    fn a_tube_is_one_area_that_holds_every_box() {
+        let axes = equal_axes([Some((0.0, 10.0)), Some((0.0, 10.0))], [0.0, 0.0, 500.0, 500.0]).unwrap();
+        let middles: Vec<[f64; 2]> =
+            (0..1000).map(|k| [0.01 * f64::from(k), 0.00001 * f64::from(k * k)]).collect();
+        let halves = vec![[0.3, 0.2]; middles.len()];
+        let tube = Tube { label: "tube".into(), middles, halves, colour: 0 };
+        let rings = around(&tube, &axes);
+        assert!(rings.len() <= BOXES + 1, "{}", rings.len());
+        // Twice the signed area: all alike, so that they add up to one area.
+        let size = |ring: &Vec<Point>| -> f64 {
+            let next = ring.iter().cycle().skip(1);
+            ring.iter().zip(next).map(|(a, b)| a.0 * b.1 - a.1 * b.0).sum()
+        };
+        assert!(rings.iter().all(|ring| size(ring) > 0.0));
+        let inside = |ring: &Vec<Point>, at: Point| {
+            let next = ring.iter().cycle().skip(1);
+            ring.iter()
+                .zip(next)
+                .all(|(a, b)| (b.0 - a.0) * (at.1 - a.1) - (b.1 - a.1) * (at.0 - a.0) >= -1e-6)
+        };
+        for k in (0..1000).step_by(37) {
+            let (middle, half) = (tube.middles[k], tube.halves[k]);
+            // 1 % of the box: what the path bends between boxes that are drawn.
+            let corner = axes.place(middle[0] + 0.99 * half[0], middle[1] - 0.99 * half[1]);
+            assert!(rings.iter().any(|ring| inside(ring, corner)), "box {k}");
+        }
+        let plot = PathPlot { tubes: vec![tube], ..PathPlot::default() };
+        let mut canvas = Canvas::new("test", WIDTH, HEIGHT);
+        draw(&plot, &mut canvas).unwrap();
+        let svg = canvas.document();
+        assert_eq!(
+            (svg.matches("fill-rule=\"nonzero\"").count(), svg.matches(">\ntube\n<").count()),
+            (1, 1),
+            "{svg}"
+        );
     }
 
     #[test]

@@ -3,11 +3,11 @@
 use punctual_core::elementary;
 
 use super::axes::Axes;
-use super::canvas::{Anchor, Canvas, INK, MARK, Pen, SAFE};
+use super::canvas::{Anchor, Canvas, INK, MARK, Pen, Point, SAFE};
 use super::decimate::decimate;
 use super::legend::{self, Entry, Key};
 use super::scale::{Axis, extent, percentiles};
-use super::{POINTS, Scale, Series, Style, TimePlot, colour};
+use super::{Band, POINTS, Scale, Series, Style, TUBE, TimePlot, colour, tube_key};
 
 /// Width of the sheet in pixels.
 pub(super) const WIDTH: f64 = 900.0;
@@ -94,6 +94,10 @@ fn draw_panel(plot: &TimePlot, axes: &Axes, canvas: &mut Canvas, last: bool) {
             canvas.text(&mark.label, (x, top - 8.0), 12.0, Anchor::Middle, MARK);
         }
     }
+    for band in &plot.bands {
+        let ring = ring(band, axes);
+        canvas.clipped(axes.area, |canvas| canvas.polygon(&ring, colour(band.colour), TUBE));
+    }
     for (i, series) in plot.series.iter().enumerate() {
         let length = series.time.len().min(series.values.len());
         let kept = decimate(&[&series.values[..length]], POINTS);
@@ -117,6 +121,25 @@ fn draw_panel(plot: &TimePlot, axes: &Axes, canvas: &mut Canvas, last: bool) {
     }
 }
 
+/// The outline of a band on the sheet: along its lower end, and back along the upper one.
+fn ring(band: &Band, axes: &Axes) -> Vec<Point> {
+    let length = band.time.len().min(band.low.len()).min(band.high.len());
+    let side = |values: &[f64]| {
+        let mut points: Vec<Point> = Vec::new();
+        for (time, value) in band.time.iter().zip(values).take(length) {
+            let point = axes.place(*time, *value);
+            if let (true, Some(last)) = (band.steps, points.last()) {
+                points.push((point.0, last.1));
+            }
+            points.push(point);
+        }
+        points
+    };
+    let (mut ring, back) = (side(&band.low), side(&band.high));
+    ring.extend(back.into_iter().rev());
+    ring
+}
+
 fn pen(i: usize, series: &Series) -> Pen {
     let dash = (series.style == Style::Dashed).then_some((7.0, 4.0));
     Pen { colour: colour(series.colour.unwrap_or(i)), width: if dash.is_some() { 1.6 } else { 1.9 }, dash }
@@ -126,6 +149,9 @@ fn entries(plot: &TimePlot) -> Vec<Entry> {
     let series = plot.series.iter().enumerate().filter(|(_, series)| !series.label.is_empty());
     let mut entries: Vec<Entry> =
         series.map(|(i, series)| (Key::Line(pen(i, series)), series.label.clone())).collect();
+    for band in plot.bands.iter().filter(|band| !band.label.is_empty()) {
+        entries.push((tube_key(band.colour), band.label.clone()));
+    }
     for region in plot.regions.iter().filter(|region| !region.label.is_empty()) {
         entries.push((Key::Patch(SAFE, 0.10, Pen::solid(SAFE, 0.5)), region.label.clone()));
     }
@@ -134,7 +160,8 @@ fn entries(plot: &TimePlot) -> Vec<Entry> {
 
 /// The y axis, and a note if values lie beyond it.
 fn y_axis(plot: &TimePlot, height: f64) -> Result<(Axis, Option<String>), String> {
-    let values = || plot.series.iter().flat_map(|s| s.values.iter().copied());
+    let bands = || plot.bands.iter().flat_map(|band| band.low.iter().chain(&band.high).copied());
+    let values = || plot.series.iter().flat_map(|s| s.values.iter().copied()).chain(bands());
     let bounds = || plot.bounds.iter().map(|mark| mark.at);
     let (low, high) = extent(values()).ok_or("there is no finite value")?;
     let count = ((height / 45.0) as usize).max(2);
@@ -226,6 +253,27 @@ mod tests {
             assert_eq!(height(&two), 2.0 * panel(&two) + BOTTOM);
         }
         assert_eq!((height(&[named(4)]), panel(&[named(130)])), (SINGLE, SINGLE - BOTTOM));
+    }
+
+    #[test]
+    fn a_band_is_in_the_picture_and_has_its_legend() {
+        let mut plot = plot(vec![0.0, 1.0], Scale::Linear);
+        plot.bands = vec![Band {
+            label: "tube".into(),
+            time: vec![0.0, 1.0],
+            low: vec![-3.0, 0.0],
+            high: vec![1.0, 7.0],
+            steps: true,
+            colour: 0,
+        }];
+        let (axis, _) = y_axis(&plot, 300.0).unwrap();
+        assert!(axis.low <= -3.0 && axis.high >= 7.0, "{} {}", axis.low, axis.high);
+        let axes = Axes { area: [0.0, 0.0, 100.0, 100.0], x: Axis::linear(0.0, 1.0, 3, false), y: axis };
+        // Held: down at the second time, and so on the way back.
+        let ring = ring(&plot.bands[0], &axes);
+        assert_eq!(ring.len(), 6, "{ring:?}");
+        assert_eq!((ring[0].1, ring[1].0), (ring[1].1, ring[2].0));
+        assert_eq!(entries(&plot).len(), 1);
     }
 
     #[test]

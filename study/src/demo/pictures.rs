@@ -98,6 +98,7 @@ fn barriers(paper: &Run, ours: &Run) -> Result<Vec<TimePlot>, Error> {
             values: [0.0, f64::INFINITY],
         }],
         scale: Scale::Fixed(-4.0 * RADIUS, 1.2 * RADIUS),
+        ..TimePlot::default()
     });
     Ok(plots)
 }
