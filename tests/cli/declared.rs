@@ -197,7 +197,7 @@ fn what_cannot_be_drawn_is_refused() {
     workshop.write("c.toml", campaign(1, "").replace("\"declared\"", "\"some\""));
     workshop
         .punctual(["campaign", "c.toml"])
-        .fails(2, "c.toml: campaign.uncertainty: is \"some\", must be \"none\" or \"declared\"");
+        .fails(2, "c.toml: campaign.uncertainty: is \"some\", must be \"none\" or \"declared\" (did you mean none?) (line 5)");
     workshop.write("plant.toml", "kind = \"plant\"\nplant.model = \"unicycle\"\n");
     workshop.write(
         "c.toml",

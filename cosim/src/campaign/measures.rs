@@ -135,8 +135,7 @@ impl Promised {
     }
 
     fn is_broken(&self) -> bool {
-        // What is no number is broken.
-        self.least.is_some_and(|least| !(least >= -TOLERANCE * self.size))
+        self.least.is_some_and(|least| least.is_nan() || least < -TOLERANCE * self.size)
     }
 }
 

@@ -269,7 +269,8 @@ deadline = 6.0
                 most = values.iter().fold(most, |most, value| most.max(*value));
                 changes += usize::from(values.windows(2).any(|two| two[0] != two[1]));
             }
-            assert!(least < -0.9 && most > 0.9, "{kind:?}: {least} to {most}");
+            // Of 40 uniform numbers none is beyond 0.8 at one side in 1.5 % of all cases.
+            assert!(least < -0.8 && most > 0.8, "{kind:?}: {least} to {most}");
             match kind {
                 DeviationKind::Constant => assert_eq!(changes, 0),
                 DeviationKind::Changing => assert!(changes > 30, "{changes}"),
@@ -345,7 +346,8 @@ deadline = 6.0
         instance.exit_initialization_mode().unwrap();
         let start = read(&mut instance);
         assert_eq!((start[0], start[2].abs()), (0.0, 0.25));
-        assert!((start[3] - (2.0 - 73.0_f64.sqrt())).abs() < 1e-12, "{start:?}");
+        // √(R² + s²) − √(d² + s²), rounded by the radius.
+        assert!((start[3] - (8.0_f64.sqrt() - 77.0_f64.sqrt())).abs() < 1e-12, "{start:?}");
         let go = |instance: &mut Instance, k: u32| {
             instance.set_real(&["u.u_x", "u.u_y"].map(reference), &[1.0, 0.0]).unwrap();
             instance.do_step(STEP * f64::from(k), STEP).unwrap();
