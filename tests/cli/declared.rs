@@ -198,15 +198,21 @@ fn what_cannot_be_drawn_is_refused() {
     workshop
         .punctual(["campaign", "c.toml"])
         .fails(2, "c.toml: campaign.uncertainty: is \"some\", must be \"none\" or \"declared\" (did you mean none?) (line 5)");
-    workshop.write("plant.toml", "kind = \"plant\"\nplant.model = \"unicycle\"\n");
+    // The same signals, and another mass.
+    workshop.write(
+        "plant.toml",
+        "kind = \"plant\"\n[plant]\nstates = [{ name = \"x_p\", unit = \"m\" }, { name = \"y_p\", unit = \"m\" }, \
+         { name = \"v_x\", unit = \"m/s\" }, { name = \"v_y\", unit = \"m/s\" }]\n\
+         inputs = [{ name = \"u_x\", unit = \"m/s2\" }, { name = \"u_y\", unit = \"m/s2\" }]\n\
+         derivatives = { x_p = \"v_x\", y_p = \"v_y\", v_x = \"0.9 * u_x\", v_y = \"0.9 * u_y\" }\n",
+    );
     workshop.write(
         "c.toml",
         campaign(1, "").replace("system = \"filter.toml\"\n", "")
             + "[system.experiment]\nstop_time = 1.0\nstep = 0.05\n\
                [[system.component]]\nname = \"filter\"\nfmu = \"filter.toml\"\n\
-               start = { \"x.x_p\" = 0.0, \"x.y_p\" = 0.0, \"x.v_x\" = 0.0, \"x.v_y\" = 0.0 }\n\
-               [[system.component]]\nname = \"plant\"\nfmu = \"plant.toml\"\nstart = { \"u.omega\" = 0.0 }\n\
-               [[system.connection]]\nfrom = \"filter.u.u_x\"\nto = \"plant.u.a\"\n",
+               [[system.component]]\nname = \"plant\"\nfmu = \"plant.toml\"\n\
+               [[system.connect_by_name]]\ncomponents = [\"filter\", \"plant\"]\n",
     );
     workshop.punctual(["campaign", "c.toml"]).fails(
         2,

@@ -108,7 +108,9 @@ pub fn deviations(
             ));
         }
         if let Some(key) = owner.start.keys().find(|key| !may_differ(Role::Filter, key)) {
-            return refuse(format!("the system gives {key} another value; state it in the filter's file"));
+            return refuse(format!(
+                "the system gives {key} a value, which may not be that of the file; state it there"
+            ));
         }
         let driven = links.iter().filter(|link| {
             link.from.component == c && is_of(&descriptions[c].variables[link.from.variable].name, "u")
