@@ -51,7 +51,7 @@ fn stepped(fmu: &Fmu) -> Slave<'_> {
 #[test]
 fn the_layout_is_what_is_documented() {
     assert_eq!(crc32(b"123456789"), 0xcbf4_3926, "the check value of CRC-32");
-    for (configuration, size) in [(FILTER, 962), (PLANT, 202)] {
+    for (configuration, size) in [(FILTER, 970), (PLANT, 202)] {
         let fmu = Fmu::new(configuration);
         let bytes = stepped(&fmu).now();
         assert_eq!(&bytes[..VERSION], b"PUNCTUAL");
