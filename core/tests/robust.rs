@@ -463,11 +463,17 @@ fn a_lag_is_accounted_for() {
     assert!(found.broken == 0 && found.withdrawn == 0 && found.accepted > 0, "{found:?}");
 }
 
-/// A plan for an uncertain plant ends, and is prolonged again and again, where the vehicle rests too.
+/// A plan for an uncertain plant ends, and is prolonged again and again. Where a vehicle rests, an adversary that knows the law
+/// may keep it where no longer plan is found: one in twenty may expire, which is known (docs/theory.md#robust-plan).
 #[test]
 fn promises_go_on() {
-    is_kept(&tally_until(20.0, "point mass", &PointMass, [4.0, 4.0], Declared::all, 1));
-    is_kept(&tally_until(20.0, "unicycle", &Unicycle, [4.0, 1.5], Declared::all, 2));
+    for (name, found) in [
+        ("point mass", tally_until(20.0, "point mass", &PointMass, [4.0, 4.0], Declared::all, 1)),
+        ("unicycle", tally_until(20.0, "unicycle", &Unicycle, [4.0, 1.5], Declared::all, 2)),
+    ] {
+        assert!(found.broken == 0 && 10 * found.accepted >= 9 * found.nominal, "{name}: {found:?}");
+        assert!(20 * found.withdrawn <= found.accepted, "{name}: {found:?}");
+    }
 }
 
 /// A loop that is sometimes slow: samples come up to 30 % late, or at any time before.

@@ -52,7 +52,8 @@ def simulate(
       gives to the filter (an array in the order of the filter's inputs, the states first; valid during the call) that
       returns all of u_ref. In the filter's units where the plant has others. Default: the start values of u_ref, zeros.
     - `parameters`: start values of the filter by name, such as `{"goal.deadline": 8.0}`; also of inputs that the plant
-      does not give.
+      does not give. Without direct feedthrough the filter's input acts a step late: `actuation_delay` is then the step,
+      unless given here or in the filter's file.
     - `record`: the names of what is returned. Default: all outputs of the plant, `u_ref.*` and all outputs of the
       filter, but texts and the Integer twins of enumerations (`status_code`). Where both have an output of one name, the plant's is called `plant.<name>`.
 
@@ -73,6 +74,7 @@ def simulate(
         if not begin < stop_time < math.inf:
             raise Error(f"stop_time: is {stop_time}, must be finite and > start_time = {begin}")
         starts = _starts(own, "parameters", parameters or {}), _starts(plant, "start", start or {})
+        _account_for_delay(own, starts[0], step_size)
         pair = _Pair(own, plant, starts, record)
         pair.wish(nominal)
         pair.begin(begin, stop_time)
@@ -89,6 +91,17 @@ def _starts(slave: Slave, field: str, given: Mapping[str, float]) -> dict[str, f
             raise Error(f"{field}: {name!r} is not a parameter or input of the {slave.name}, which has {', '.join(known)}")
         starts[full] = float(value)
     return starts
+
+
+def _account_for_delay(own: Slave, starts: dict[str, float], step_size: float) -> None:
+    """Tells a filter whose input acts a step late by how much, if it can account for that and nothing else was said."""
+    delay = own.variables.get("actuation_delay")
+    is_told = "actuation_delay" in starts or "actuation_delay" not in own.names("parameter")
+    if own.direct or delay is None or is_told or float(delay.start or 0.0) > 0.0:
+        return
+    if step_size <= own.suggested_step * (1.0 + 1e-9):
+        # No longer than the step that the filter is made for, not even by round-off.
+        starts["actuation_delay"] = min(step_size, own.suggested_step)
 
 
 def _check_fed(slave: Slave, field: str, fed: Sequence[str], other: Slave) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 import os
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -43,6 +44,7 @@ class Slave:
         self.variables: dict[str, Any] = {v.name: v for v in description.modelVariables}
         experiment = description.defaultExperiment
         self.suggested_start = float((experiment and experiment.startTime) or 0.0)
+        self.suggested_step = float((experiment and experiment.stepSize) or math.inf)
         self._bases = {unit.name: unit.baseUnit for unit in description.unitDefinitions}
         depends = {o.variable.name: o.dependencies for o in description.outputs}
         self.direct = {
