@@ -340,7 +340,7 @@ impl<'a> Planning<'a> {
                 acting: self.rows.acting(),
                 arrived: &arrived,
                 period: self.plans.period,
-                last: self.before().last_time().filter(|last| *last < t),
+                last: self.before().last_time(),
             }
         });
         let mut planner = Planner::new(plant, dims, bounds, &requirements, period, size)
