@@ -152,14 +152,14 @@ impl Fitting<'_> {
             }
             (active, arrival)
         };
+        let is_active = |active: &Active, i: usize| match i {
+            0 => active.delay,
+            i if i <= m => active.lags[i - 1],
+            i => active.gains[i - 1 - m],
+        };
         // What is negligible goes at once.
         for i in 0..=2 * m {
-            let is_active = match i {
-                0 => active.delay,
-                i if i <= m => active.lags[i - 1],
-                i => active.gains[i - 1 - m],
-            };
-            if !is_active {
+            if !is_active(&active, i) {
                 (_, best.arrival) = without(&active, &best.arrival, i);
             }
         }
@@ -171,12 +171,7 @@ impl Fitting<'_> {
         loop {
             let mut least: Option<(f64, Explained, Active)> = None;
             for i in 0..=2 * m {
-                let is_active = match i {
-                    0 => active.delay,
-                    i if i <= m => active.lags[i - 1],
-                    i => active.gains[i - 1 - m],
-                };
-                if !is_active {
+                if !is_active(&active, i) {
                     continue;
                 }
                 let (fewer, arrival) = without(&active, &best.arrival, i);

@@ -23,7 +23,8 @@
 //! An input that is followed late by a time constant adds rows of its own: what arrives is v + δ + λ, and λ, which jumps by
 //! −(Δv + Δδ) at every sample, dies away meanwhile. So only changes of the input are late, the law's among them, and the
 //! zonotope knows from which deviations these come. The answer to errors of measurement is apart: what arrives of it is a
-//! mean of earlier answers, so that it counts as it is, anew at every instant.
+//! mean of earlier answers, so that it counts as it is, anew at every instant. The same rows serve where samples come late:
+//! until the next sample all of λ may be there, and afterwards nothing.
 //!
 //! | module | owns |
 //! |---|---|
@@ -348,13 +349,8 @@ impl<'a> Tube<'a> {
         let generators = if self.of.lags() { LATE_GENERATORS } else { GENERATORS };
         self.set.reduce(generators, kept, &sizes, &mut self.rooms.scores);
         self.set.map(|i, j| match i.checked_sub(kept) {
-            Some(input) => {
-                if j < n {
-                    share(input, j)
-                } else {
-                    0.0
-                }
-            }
+            Some(input) if j < n => share(input, j),
+            Some(_) => 0.0,
             None => f64::from(i == j),
         });
         if self.late > 0 {
