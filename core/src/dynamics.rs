@@ -1,5 +1,6 @@
 //! Control-affine dynamics `ẋ = f(x) + g(x) u`, written once and generic over the scalar.
 
+use alloc::sync::Arc;
 use core::array::from_fn;
 
 use crate::elementary;
@@ -265,6 +266,34 @@ where
 
     fn region(&self, x: &[f64; EXTENDED], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
         self.0.region(&from_fn(|i| x[i]), bounds, time)
+    }
+}
+
+/// One plant of several owners.
+impl<P, const NX: usize, const NU: usize> ControlAffine<NX, NU> for Arc<P>
+where
+    P: ControlAffine<NX, NU>,
+{
+    const LARGEST_DEGREE: usize = P::LARGEST_DEGREE;
+    const SLOW_CURVATURE: bool = P::SLOW_CURVATURE;
+
+    #[inline]
+    fn drift<S: Scalar>(&self, x: &[S; NX]) -> [S; NX] {
+        (**self).drift(x)
+    }
+
+    #[inline]
+    fn input_map<S: Scalar>(&self, x: &[S; NX]) -> [[S; NU]; NX] {
+        (**self).input_map(x)
+    }
+
+    #[inline]
+    fn derivative<S: Scalar>(&self, x: &[S; NX], u: &[S; NU]) -> [S; NX] {
+        (**self).derivative(x, u)
+    }
+
+    fn region(&self, x: &[f64; NX], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<Region> {
+        (**self).region(x, bounds, time)
     }
 }
 

@@ -36,7 +36,7 @@ use crate::dynamics::{ControlAffine, WithPoint, first};
 use crate::error::{Error, ErrorKind};
 use crate::interval::Interval;
 use crate::jet::{Dual, Response, Tangent, Taylor};
-use crate::scalar::all_finite;
+use crate::scalar::{Scalar, all_finite};
 use crate::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 
 pub use crate::error::RelativeDegree;
@@ -45,8 +45,8 @@ pub use external::external;
 use place::Place;
 pub(crate) use source::FEW_ORDERS;
 pub use source::{
-    DerivativeSource, Direction, Directional, EXPANSION_ORDERS, Expansion, ExpansionOver, PlantId, Predict,
-    PredictDirectional, RateOver, Second, SharedPlant,
+    DerivativeSource, Direction, Directional, EXPANSION_ORDERS, Expansion, ExpansionOver, Follows, PlantId,
+    Predict, PredictDirectional, RateOver, Second, SharedPlant,
 };
 
 /// The Taylor series of h(t, x(t)) at `t` and `x` with u = 0, `K` coefficients, each with its
@@ -135,7 +135,27 @@ struct Along<P, B, const NX: usize, const NU: usize, const K: usize, const N: us
     plant: Arc<P>,
     barrier: B,
     place: Place,
+    /// If it follows a point: where the point begins, and the plant without it.
+    beside: Option<Beside>,
     dims: PhantomData<([(); NX], [(); NU])>,
+}
+
+/// The plant without the point that a barrier follows.
+struct Beside {
+    first: usize,
+    plant: PlantId,
+    alone: Box<dyn Predict + Send>,
+}
+
+/// No barrier: h = 0.
+struct Nothing;
+
+impl<const NX: usize> Barrier<NX> for Nothing {
+    const ONE_SIDED_CURVATURE: bool = true;
+
+    fn value<S: Scalar>(&self, _t: S, _x: &[S; NX]) -> S {
+        S::zero()
+    }
 }
 
 impl<P, B, const NX: usize, const NU: usize, const K: usize, const N: usize> Along<P, B, NX, NU, K, N>
@@ -143,6 +163,11 @@ where
     P: ControlAffine<NX, NU>,
     B: Barrier<NX>,
 {
+    /// What is known of the point that it follows: it is asked only of a source that does.
+    fn of_point(&self) -> &Beside {
+        self.beside.as_ref().expect("a source that follows a point")
+    }
+
     /// Writes the derivatives given by the coefficients of `h`.
     #[inline(always)]
     fn write(h: &Response<NU, K>, out: &mut Derivatives) {
@@ -198,6 +223,10 @@ where
 
     fn shared(&self) -> Option<&dyn SharedPlant> {
         Some(self)
+    }
+
+    fn follows(&self) -> Option<&dyn Follows> {
+        self.beside.is_some().then_some(self)
     }
 
     fn highest(&self, t: f64, x: &[f64], bounds: [&[f64]; 2], time: [f64; 2]) -> Option<f64> {
@@ -320,8 +349,7 @@ where
     }
 
     fn second_value(&self, time: Interval, x: &[Second]) -> Option<Second> {
-        let time = Second { value: Tangent { value: time, ..Tangent::from(0.0) }, ..Second::from(0.0) };
-        Some(self.barrier.value(time, &self.place.take::<_, NX>(x)))
+        Some(self.barrier.value(second_time(time), &self.place.take::<_, NX>(x)))
     }
 
     fn lowest_held(&self, t: f64, x: &[f64], u: &[f64], duration: f64, wanted: f64) -> Option<f64> {
@@ -387,6 +415,54 @@ where
     }
 }
 
+impl<P, B, const NX: usize, const NU: usize, const K: usize, const N: usize> Follows
+    for Along<P, B, NX, NU, K, N>
+where
+    P: ControlAffine<NX, NU>,
+    B: Barrier<NX>,
+{
+    fn first(&self) -> usize {
+        self.of_point().first
+    }
+
+    fn plant(&self) -> PlantId {
+        self.of_point().plant
+    }
+
+    fn alone(&self) -> &dyn Predict {
+        &*self.of_point().alone
+    }
+
+    fn steepness(&self) -> Option<f64> {
+        B::STEEPNESS
+    }
+
+    fn value(&self, t: f64, x: &[f64], point: &[f64; 4]) -> f64 {
+        self.barrier.value(t, &Place::beside(x, point))
+    }
+
+    fn value_along(&self, t: f64, path: &[Expansion], point: &[Expansion; 4], out: &mut Expansion) {
+        *out = ahead::value_along::<B, NX>(&self.barrier, t, &Place::beside::<_, NX>(path, point));
+    }
+
+    fn value_over(&self, time: Interval, path: &[ExpansionOver], point: &[ExpansionOver; 4]) -> Interval {
+        ahead::value_over::<B, NX>(&self.barrier, time, &Place::beside::<_, NX>(path, point))
+    }
+
+    fn last_over(&self, time: Interval, path: &[ExpansionOver], point: &[ExpansionOver; 4]) -> Interval {
+        ahead::last_over::<B, NX>(&self.barrier, time, &Place::beside::<_, NX>(path, point))
+    }
+
+    fn second_value(&self, time: Interval, x: &[Second], point: &[Second; 4]) -> Second {
+        self.barrier.value(second_time(time), &Place::beside(x, point))
+    }
+}
+
+/// The time as a number with derivatives along states: it has none.
+fn second_time(time: Interval) -> Second {
+    Second { value: Tangent { value: time, ..Tangent::from(0.0) }, ..Second::from(0.0) }
+}
+
 /// The expectation that is violated if a room belongs to another plant.
 const ROOM: &str = "a room that a source along the same plant has made";
 
@@ -450,18 +526,18 @@ where
     P: ControlAffine<NX, NU> + Send + Sync + 'static,
     B: Barrier<NX> + Send + 'static,
 {
-    placed(plant, barrier, n, Place::START)
+    placed(plant, barrier, n, (Place::START, None))
 }
 
-/// The same for a barrier that follows a measured point: along a plant beside a point, whose position and velocity are the
-/// four components of the filter's x from `first` on. The other states are its first components. So several barriers of a
-/// filter can each follow a point of their own.
+/// The same for a barrier that follows a measured point: along the plant [beside a point](WithPoint), whose position and
+/// velocity are the four components of the filter's x from `first` on. The other states are its first components. So several
+/// barriers of a filter can each follow a point of their own.
 ///
 /// # Errors
 ///
 /// As for [`along`]; `first` below `NX`, where the states of the plant are.
 pub fn following<P, B, const NX: usize, const EXTENDED: usize, const NU: usize>(
-    plant: Arc<WithPoint<P, NX>>,
+    plant: Arc<P>,
     barrier: B,
     n: usize,
     first: usize,
@@ -474,14 +550,23 @@ where
         let message = format!("is {first}, must be >= {NX}, the number of states of the plant");
         return Err(Error::new(ErrorKind::Range, "first", message));
     }
-    placed::<_, _, EXTENDED, NU>(plant, barrier, n, Place::new(NX, first))
+    let alone = Along::<P, Nothing, NX, NU, 2, 1> {
+        plant: Arc::clone(&plant),
+        barrier: Nothing,
+        place: Place::START,
+        beside: None,
+        dims: PhantomData,
+    };
+    let beside = Beside { first, plant: PlantId::of(&plant, [NX, NU]), alone: Box::new(alone) };
+    let plant = Arc::new(WithPoint::<_, NX>(plant));
+    placed::<_, _, EXTENDED, NU>(plant, barrier, n, (Place::new(NX, first), Some(beside)))
 }
 
 fn placed<P, B, const NX: usize, const NU: usize>(
     plant: Arc<P>,
     barrier: B,
     n: usize,
-    place: Place,
+    (place, beside): (Place, Option<Beside>),
 ) -> Result<Box<dyn DerivativeSource>, Error>
 where
     P: ControlAffine<NX, NU> + Send + Sync + 'static,
@@ -493,7 +578,7 @@ where
             match n {
                 // A constant condition: impossible degrees are not compiled.
                 $($n if const { $n <= P::LARGEST_DEGREE } => {
-                    Ok(Box::new(Along::<P, B, NX, NU, $k, $n> { plant, barrier, place, dims: PhantomData }) as _)
+                    Ok(Box::new(Along::<P, B, NX, NU, $k, $n> { plant, barrier, place, beside, dims: PhantomData }) as _)
                 })*
                 _ => Err(no_degree(n, P::LARGEST_DEGREE.min(MAX_RELATIVE_DEGREE))),
             }

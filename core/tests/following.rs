@@ -21,9 +21,9 @@ fn disc() -> DistanceDisc {
 
 /// A source on [`OWN`], and the same on [`X`].
 fn sources() -> [Box<dyn DerivativeSource>; 2] {
-    let plant = Arc::new(WithPoint::<_, 4>(PointMass));
-    let alone = along::<_, _, 8, 2>(Arc::clone(&plant), disc(), 2).expect("in range");
-    [alone, following::<_, _, 4, 8, 2>(plant, disc(), 2, 8).expect("in range")]
+    let beside = Arc::new(WithPoint::<_, 4>(PointMass));
+    let alone = along::<_, _, 8, 2>(beside, disc(), 2).expect("in range");
+    [alone, following::<_, _, 4, 8, 2>(Arc::new(PointMass), disc(), 2, 8).expect("in range")]
 }
 
 /// Those components of `all` that are the second source's own.
@@ -102,11 +102,11 @@ fn directions_are_its_own_too() {
 /// derivative of a sample that differences say.
 #[test]
 fn each_barrier_follows_its_own_point() {
-    // One object in two places is two plants.
-    let beside = Arc::new(WithPoint::<_, 4>(Unicycle));
+    // Beside points in two places one object is two plants.
+    let plant = Arc::new(Unicycle);
     let clear = |first: usize| {
         let disc = Outside(DistanceDisc::new([0.0, 0.0], 1.0, 1.0).expect("valid disc").following(4));
-        following::<_, _, 4, 8, 2>(Arc::clone(&beside), disc, 2, first).expect("in range")
+        following::<_, _, 4, 8, 2>(Arc::clone(&plant), disc, 2, first).expect("in range")
     };
     let goal = DistanceDisc::new([12.0, 5.0], 2.0, 2.0).expect("valid disc");
     let both = || {
@@ -164,7 +164,7 @@ fn derivatives_from_elsewhere_predict_nothing() {
 
 #[test]
 fn a_point_does_not_lie_among_the_states() {
-    let refused = following::<_, _, 4, 8, 2>(Arc::new(WithPoint::<_, 4>(PointMass)), disc(), 2, 3);
+    let refused = following::<_, _, 4, 8, 2>(Arc::new(PointMass), disc(), 2, 3);
     let message = "first: is 3, must be >= 4, the number of states of the plant";
     assert_eq!(refused.err().map(|e| e.to_string()).as_deref(), Some(message));
 }

@@ -171,6 +171,7 @@ impl DistanceDisc {
 
 impl<const NX: usize> Barrier<NX> for DistanceDisc {
     const ONE_SIDED_CURVATURE: bool = true;
+    const STEEPNESS: Option<f64> = Some(1.0);
 
     #[inline(always)]
     fn value<S: Scalar>(&self, t: S, x: &[S; NX]) -> S {

@@ -32,6 +32,7 @@ pub struct Outside<B>(pub B);
 
 impl<B: Barrier<NX>, const NX: usize> Barrier<NX> for Outside<B> {
     const ONE_SIDED_CURVATURE: bool = B::ONE_SIDED_CURVATURE;
+    const STEEPNESS: Option<f64> = B::STEEPNESS;
 
     #[inline(always)]
     fn value<S: Scalar>(&self, t: S, x: &[S; NX]) -> S {

@@ -12,7 +12,7 @@ use crate::barrier::Barrier;
 use crate::convergence::condition::Condition;
 use crate::convergence::profile::Profile;
 use crate::convergence::{FixedTime, FixedTimeState};
-use crate::dynamics::ControlAffine;
+use crate::dynamics::{ControlAffine, WithPoint};
 use crate::error::{Error, ErrorKind, length, non_negative, positive};
 use crate::lie::{self, DerivativeSource};
 use crate::qp::{self, Bounds, Enforcement, Row};
@@ -155,6 +155,32 @@ impl<P, const NX: usize, const NU: usize> FilterBuilder<P, NX, NU> {
         Ok(self)
     }
 
+    /// Adds a barrier that follows a measured point: one of the plant [beside a point](WithPoint), of `EXTENDED` = `NX` + 4
+    /// states. The position and the velocity of its own point are appended to x. What is known of how the point moves is
+    /// for [plans](super::Plans::motion); rows take its velocity as constant.
+    ///
+    /// # Errors
+    ///
+    /// As for [`Self::barrier`].
+    pub fn following<B, const EXTENDED: usize>(
+        mut self,
+        name: &str,
+        barrier: B,
+        settings: BarrierSettings,
+    ) -> Result<Self, Error>
+    where
+        P: ControlAffine<NX, NU> + Send + Sync + 'static,
+        B: Barrier<EXTENDED> + Send + 'static,
+    {
+        let beside = WithPoint::<_, NX>(Arc::clone(&self.plant));
+        let n = lie::detected::<_, _, EXTENDED, NU>(&beside, &barrier).require(None);
+        let n = n.map_err(|e| e.within(name))?;
+        let first = self.parts.state_dim + self.parts.measured;
+        self.parts.measured += 4;
+        let source = lie::following::<_, _, NX, EXTENDED, NU>(self.plant(), barrier, n, first)?;
+        self.source(name, source, settings)
+    }
+
     /// Appends `count` numbers to x, after the states of the plant: quantities that only some barriers depend on, such as the
     /// position and velocity of a point that one [follows](lie::following), or derivatives from
     /// [elsewhere](lie::external()). Default: 0.
@@ -162,15 +188,15 @@ impl<P, const NX: usize, const NU: usize> FilterBuilder<P, NX, NU> {
     /// ```
     /// use std::sync::Arc;
     ///
-    /// # use punctual_core::{barriers::{DistanceDisc, Outside}, dynamics::WithPoint, filter::*, lie};
+    /// # use punctual_core::{barriers::{DistanceDisc, Outside}, filter::*, lie};
     /// # use punctual_core::plants::Unicycle;
-    /// // x = (x_p, y_p, θ, v, p_x, p_y, v_x, v_y): a goal, and a vehicle at p to keep away from.
+    /// // x = (x_p, y_p, θ, v, p_x, p_y, v_x, v_y): a goal, and a vehicle at p to keep away from, as `following` adds it.
     /// let clear = Outside(DistanceDisc::new([0.0, 0.0], 2.0, 2.0)?.following(4));
-    /// let beside = Arc::new(WithPoint::<_, 4>(Unicycle));
-    /// let filter = Filter::builder(Unicycle)
-    ///     .measured(4)
+    /// let builder = Filter::builder(Unicycle).measured(4);
+    /// let source = lie::following::<_, _, 4, 8, 2>(builder.plant(), clear, 2, 4)?;
+    /// let filter = builder
     ///     .barrier("goal", DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?, BarrierSettings::within(10.0))?
-    ///     .source("clear", lie::following::<_, _, 4, 8, 2>(beside, clear, 2, 4)?, BarrierSettings::keeping())?
+    ///     .source("clear", source, BarrierSettings::keeping())?
     ///     .build()?;
     /// # Ok::<(), punctual_core::Error>(())
     /// ```

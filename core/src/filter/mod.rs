@@ -23,6 +23,8 @@ pub use crate::convergence::{
     FixedTimeSettings as BarrierSettings, Infeasible, Method, Phase, ProfileKind, Refusal,
 };
 #[cfg(feature = "plan")]
+pub use crate::plan::Motion;
+#[cfg(feature = "plan")]
 pub use backup::{Assurance, AssuranceStatus, Bears, Driver, PlanState, Planning, Plans, Reason};
 pub use builder::FilterBuilder;
 pub use integrator::Integration;

@@ -36,6 +36,12 @@ impl Place {
         }
     }
 
+    /// The own states if the last four are `point`, and the others those of the plant.
+    #[inline(always)]
+    pub(super) fn beside<T: Copy, const N: usize>(x: &[T], point: &[T; 4]) -> [T; N] {
+        core::array::from_fn(|i| if i + 4 < N { x[i] } else { point[i + 4 - N] })
+    }
+
     /// The result of `read` on the own states.
     #[inline(always)]
     pub(super) fn read<T: Copy, R, const N: usize>(self, x: &[T], read: impl Fn(&[T]) -> R) -> R {

@@ -54,6 +54,11 @@ pub trait DerivativeSource: Send {
         None
     }
 
+    /// The source as one whose barrier follows a measured point, if it does. The default does not.
+    fn follows(&self) -> Option<&dyn Follows> {
+        None
+    }
+
     /// An upper bound on h between `time[0]` and `time[1]` s after `t` and `x`, under any input with `bounds[0]` ≤ u ≤
     /// `bounds[1]`; for [`crate::reach`]. The default knows none.
     fn highest(&self, _t: f64, _x: &[f64], _bounds: [&[f64]; 2], _time: [f64; 2]) -> Option<f64> {
@@ -159,6 +164,37 @@ pub trait Predict {
     fn lowest_from(&self, _t: f64, _x: &[f64]) -> Option<f64> {
         None
     }
+}
+
+/// A barrier that follows a measured point, for plans: the plant and the point apart. A point is its two coordinates and its
+/// velocity.
+pub trait Follows {
+    /// The component of a filter's x at which the point begins.
+    fn first(&self) -> usize;
+
+    /// Which plant it is, without the point.
+    fn plant(&self) -> PlantId;
+
+    /// The plant without the point, whose states alone are x; it has no barrier, and its h is 0.
+    fn alone(&self) -> &dyn Predict;
+
+    /// The most by which h changes per metre by which the point is moved, if that has a bound.
+    fn steepness(&self) -> Option<f64>;
+
+    /// h at time `t` (s) and at the states `x` of the plant.
+    fn value(&self, t: f64, x: &[f64], point: &[f64; 4]) -> f64;
+
+    /// As [`Predict::value_along`].
+    fn value_along(&self, t: f64, path: &[Expansion], point: &[Expansion; 4], out: &mut Expansion);
+
+    /// As [`Predict::value_over`].
+    fn value_over(&self, time: Interval, path: &[ExpansionOver], point: &[ExpansionOver; 4]) -> Interval;
+
+    /// As [`Predict::last_over`].
+    fn last_over(&self, time: Interval, path: &[ExpansionOver], point: &[ExpansionOver; 4]) -> Interval;
+
+    /// As [`Predict::second_value`].
+    fn second_value(&self, time: Interval, x: &[Second], point: &[Second; 4]) -> Second;
 }
 
 /// Which plant a source is along: one object in memory, which all of its sources share. Two objects are two plants, even if

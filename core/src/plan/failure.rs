@@ -67,6 +67,15 @@ pub enum Failure {
         #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
         beyond: f64,
     },
+    /// The point that a barrier follows is farther from where it was expected than its declared [`Motion`](crate::filter::Motion)
+    /// allows.
+    Strays {
+        /// The number of the barrier.
+        barrier: usize,
+        /// How much farther, > 0, in m.
+        #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+        beyond: f64,
+    },
     /// The next sample comes before the input of this one acts, so that two inputs are on their way.
     Overtaken,
     /// A requirement began while no plan was followed, so it is not known whether it was met.
@@ -172,6 +181,11 @@ impl fmt::Display for Named<'_> {
                 "{} is {} farther from the plan than the declared uncertainty allows",
                 names.state(state),
                 names.state_amount(state, beyond)
+            ),
+            Failure::Strays { barrier, beyond } => write!(
+                f,
+                "the point that {} follows is {beyond:.2e} m farther from its course than its declared acceleration and errors allow",
+                names.barrier(barrier)
             ),
             Failure::Overtaken => f.write_str(
                 "the next sample comes before the input of this one acts: steps must be at least as long as actuation_delay",

@@ -14,6 +14,7 @@
 //! | `check` | the exact check: a rollout that meets every requirement, between its nodes too |
 //! | `expansion` | polynomials in time, and their lower bounds |
 //! | `failure` | messages that say why there is no plan |
+//! | `moving` | a barrier that follows a measured point, as a function of time |
 //! | `integral` | the mean of an integral over each period, and its limits |
 //! | `search` | reference trajectories by sequential convex programming |
 //! | `tube` | where an uncertain plant can be along a plan, under a law that holds it there |
@@ -30,6 +31,7 @@ mod failure;
 mod integral;
 mod law;
 mod model;
+mod moving;
 mod planner;
 mod search;
 mod settings;
@@ -40,6 +42,8 @@ pub(crate) use check::{CheckTolerances, TOLERANCES};
 pub use failure::{Failure, Names};
 pub(crate) use integral::{Integral, Limit};
 pub(crate) use model::slopes;
+pub use moving::Motion;
+pub(crate) use moving::{Course, Moving};
 pub(crate) use planner::{Planner, SearchProgress, Uncertain, narrowed};
 pub use tube::Tracking;
 pub(crate) use tube::Uncertainty;

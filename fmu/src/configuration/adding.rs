@@ -210,8 +210,8 @@ impl Adding<'_> {
         let source = if self.section().shape.followed().is_none() {
             self.degree(lie::detected(&*plant, &barrier), || None).and_then(|n| lie::along(plant, barrier, n))
         } else {
-            let (plant, first) = (Arc::new(WithPoint::<_, NX>(*plant)), self.first);
-            self.degree(lie::detected::<_, _, EXTENDED, 2>(&*plant, &barrier), || None)
+            let (beside, first) = (WithPoint::<_, NX>(*plant), self.first);
+            self.degree(lie::detected::<_, _, EXTENDED, 2>(&beside, &barrier), || None)
                 .and_then(|n| lie::following::<_, _, NX, EXTENDED, 2>(plant, barrier, n, first))
         };
         self.source(source)

@@ -34,13 +34,13 @@ impl Planning<'_> {
         if self.integrator.is_some() {
             return None;
         }
-        let measured = self.state(x);
-        let own = Planning { measured: Some((t, &measured)), ..*self };
+        let (measured, courses) = (self.state(x), self.courses(t, x));
+        let own = Planning { measured: Some((t, &measured)), courses: &courses, ..*self };
         let (t, x) = self.acts(t, &measured);
         let (at, shorter) = ((t, self.plans.period), &DECISIONS.shorter);
         let First { promises, plan, .. } =
-            own.first(self.promises(t, &x, |_| 1.0), at, &x, &[], shorter).ok()?;
-        let [states, inputs] = [self.rows.state_dim, self.rows.input_dim];
+            own.first(own.promises(t, &x, |_| 1.0), at, &x, &[], shorter).ok()?;
+        let [states, inputs] = [self.states, self.rows.input_dim];
         let declared = self.uncertainty.cloned().unwrap_or_else(|| Uncertainty {
             rates: vec![0.0; states],
             errors: vec![0.0; states],

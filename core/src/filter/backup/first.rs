@@ -26,10 +26,10 @@ impl Planning<'_> {
     ///
     /// Why the nearest trial fails.
     pub fn plan_from(&self, t: f64, x: &[f64], factor: f64) -> Result<BackupPlan, Failure> {
-        let measured = self.state(x);
-        let own = Planning { measured: Some((t, &measured)), ..*self };
+        let (measured, courses) = (self.state(x), self.courses(t, x));
+        let own = Planning { measured: Some((t, &measured)), courses: &courses, ..*self };
         let (t, x) = self.acts(t, &measured);
-        let promises = self.promises(t, &x, |_| factor);
+        let promises = own.promises(t, &x, |_| factor);
         own.first(promises, (t, self.plans.period), &x, &[], &DECISIONS.shorter)
             .map(|first| first.plan.backup_plan)
     }
@@ -42,10 +42,10 @@ impl Planning<'_> {
         x: &[f64],
         longest: f64,
     ) -> (Result<BackupPlan, Failure>, Option<(f64, BackupPlan)>) {
-        let measured = self.state(x);
-        let own = Planning { measured: Some((t, &measured)), ..*self };
+        let (measured, courses) = (self.state(x), self.courses(t, x));
+        let own = Planning { measured: Some((t, &measured)), courses: &courses, ..*self };
         let (acts, state) = self.acts(t, &measured);
-        let promises = self.promises(acts, &state, |_| 1.0);
+        let promises = own.promises(acts, &state, |_| 1.0);
         match own.first(promises, (acts, self.plans.period), &state, &[], &DECISIONS.shorter) {
             Ok(first) => (Ok(first.plan.backup_plan.clone()), self.least(t, x, longest, Some(first))),
             Err(failure) => (Err(failure), self.least(t, x, longest, None)),
@@ -55,8 +55,10 @@ impl Planning<'_> {
     /// Whether a first sample at `t` and `x` could promise each barrier. Not promised are: a soft barrier, one that ends
     /// before its deadline, and one without a deadline that begins at once and whose set does not contain `x`.
     pub fn promised(&self, t: f64, x: &[f64]) -> impl Iterator<Item = bool> + use<> {
+        let courses = self.courses(t, x);
+        let own = Planning { courses: &courses, ..*self };
         let (t, x) = self.acts(t, &self.state(x));
-        self.promises(t, &x, |_| 1.0).into_iter().map(|promise| promise.is_some())
+        own.promises(t, &x, |_| 1.0).into_iter().map(|promise| promise.is_some())
     }
 
     /// The least factor by which every deadline has to be multiplied so that a plan from `x` at `t` is found, and that plan.
@@ -98,11 +100,11 @@ impl Planning<'_> {
         longest: f64,
         first: Option<First>,
     ) -> Option<(f64, BackupPlan)> {
-        let measured = self.state(x);
-        let own = Planning { measured: Some((t, &measured)), ..*self };
+        let (measured, courses) = (self.state(x), self.courses(t, x));
+        let own = Planning { measured: Some((t, &measured)), courses: &courses, ..*self };
         let (t, x) = self.acts(t, &measured);
         let x = &x[..];
-        let promised = |factor: f64| self.promises(t, x, |_| factor);
+        let promised = |factor: f64| own.promises(t, x, |_| factor);
         let arrived = |factor: f64, First { promises, plan, .. }: First| {
             (factor * own.arrival(&promises, &plan, t, x), plan)
         };

@@ -35,7 +35,7 @@ use crate::MAX_INPUTS;
 use crate::error::{Error, ErrorKind, length, non_negative, positive};
 use crate::interval::Interval;
 use crate::lie::{Direction, Second, SharedPlant};
-use crate::plan::{BackupPlan, Policy, Uncertainty};
+use crate::plan::{BackupPlan, Motion, Policy, Uncertainty};
 use crate::qp::Bounds;
 pub use bears::Bears;
 use choice::Piece;
@@ -65,6 +65,8 @@ pub struct Plans {
     errors: Vec<f64>,
     /// By how much of a period a sample may come late; 0 if samples come as expected.
     jitter: f64,
+    /// How the points move that barriers follow, by the number of the barrier.
+    motions: Vec<(usize, Motion)>,
 }
 
 impl From<f64> for Plans {
@@ -92,6 +94,7 @@ impl Plans {
             lags: Vec::new(),
             errors: Vec::new(),
             jitter: 0.0,
+            motions: Vec::new(),
         }
     }
 
@@ -157,6 +160,37 @@ impl Plans {
         Self { jitter: part, ..self }
     }
 
+    /// Declares how the point moves that barrier number `barrier` [follows](crate::lie::following): its acceleration, and the
+    /// errors with which it is measured. Every promise is then kept however it moves within that. Without it no plan accounts
+    /// for such a barrier. The promise has an [end](Assurance::until), which is postponed again and again: 2 s past the last
+    /// deadline and the sample, or as far as the [horizon](Self::horizon).
+    ///
+    /// ```
+    /// # use punctual_core::{barriers::*, filter::*, lie, plants::Unicycle};
+    /// // x = (x_p, y_p, θ, v, p_x, p_y, v_x, v_y): a cyclist at p.
+    /// let clear = Outside(DistanceDisc::new([0.0, 0.0], 2.0, 1.0)?.following(4));
+    /// let mut filter = Filter::builder(Unicycle)
+    ///     .barrier("goal", DistanceDisc::new([12.0, 0.0], 2.0, 1.0)?, BarrierSettings::within(6.0))?
+    ///     .following::<_, 8>("cyclist", clear, BarrierSettings::keeping())?
+    ///     .bounds(&[-4.0, -1.5], &[4.0, 1.5])?
+    ///     .sampling(Sampling::Period(0.02))?
+    ///     .build()?
+    ///     .with_plans(Plans::every(0.02).motion(1, Motion { acceleration: 0.3, ..Motion::default() }))?;
+    /// let (x, mut u) = ([0.0, 0.0, 0.0, 1.0, 6.0, -9.0, 0.0, 0.8], [0.0; 2]);
+    /// assert!(filter.step(0.0, &x, &[4.0, 0.0], &mut u)?.is_assured());
+    /// # Ok::<(), punctual_core::Error>(())
+    /// ```
+    #[must_use]
+    pub fn motion(mut self, barrier: usize, motion: Motion) -> Self {
+        self.motions.retain(|(of, _)| *of != barrier);
+        self.motions.push((barrier, motion));
+        self
+    }
+
+    fn motion_of(&self, barrier: usize) -> Option<Motion> {
+        self.motions.iter().find(|(of, _)| *of == barrier).map(|(_, motion)| *motion)
+    }
+
     /// Declares that the sets of each pair of barriers, given by their numbers, have no state in common at any time.
     /// Promises that need both at once are then refused without a search ([`Failure::Apart`](crate::plan::Failure::Apart)).
     /// Nothing else depends on it.
@@ -192,6 +226,16 @@ impl Plans {
             }
         }
         non_negative("jitter", self.jitter)?;
+        for (barrier, Motion { acceleration, position_error, velocity_error }) in &self.motions {
+            let fields = [
+                ("acceleration", acceleration),
+                ("position_error", position_error),
+                ("velocity_error", velocity_error),
+            ];
+            for (field, value) in fields {
+                non_negative(&format!("motion[{}].{field}", barrier + 1), *value)?;
+            }
+        }
         match self.search_budget {
             0 => Err(Error::new(ErrorKind::Range, "search_budget", "is 0, must be at least 1")),
             _ => Ok(()),
@@ -252,7 +296,7 @@ impl Filter {
     /// a delay above the period; an integrator, measured quantities beside the states, or a source without derivatives on enclosures for an
     /// uncertain plant. [`Self::obstacles`] lists them all.
     pub fn with_plans(mut self, plans: impl Into<Plans>) -> Result<Self, Error> {
-        let plans = plans.into();
+        let mut plans = plans.into();
         plans.check()?;
         if self.backup.is_some() {
             return Err(Error::new(ErrorKind::Unsupported, "plans", "are there already, must be given once"));
@@ -261,14 +305,29 @@ impl Filter {
             return Err(obstacle);
         }
         let uncertainty = self.uncertainty(&plans)?;
+        if self.follows() && plans.horizon.is_none() {
+            // A point comes to no rest.
+            plans.horizon = Some(DECISIONS.following_horizon);
+        }
+        let states = self.model_states();
         let mut bounds = self.rows.bounds;
         if let Some(own) = &self.integrator {
             [bounds.min[own.of.input], bounds.max[own.of.input]] = own.rates;
         }
-        self.backup = Some(Box::new(Backup::new(plans, bounds, uncertainty)));
+        self.backup = Some(Box::new(Backup::new(plans, states, bounds, uncertainty)));
         // A hold that was known before is that of the plans.
         self.expected = self.expected.or(self.rows.expected.take());
         Ok(self)
+    }
+
+    /// Whether a barrier follows a measured point.
+    fn follows(&self) -> bool {
+        self.rows.slots.iter().any(|slot| slot.source.follows().is_some())
+    }
+
+    /// The number of states of the model: with points that barriers follow, x has the points after them.
+    fn model_states(&self) -> usize {
+        self.rows.state_dim - if self.follows() { self.rows.measured } else { 0 }
     }
 
     /// Every reason why the filter cannot have `plans`; empty if [`Self::with_plans`] accepts them.
@@ -289,12 +348,19 @@ impl Filter {
             let message = "stands before an uncertain plant, for which no plan accounts yet";
             found.push(refused("integrator", message.into()));
         }
-        if is_uncertain && rows.measured > 0 {
+        if is_uncertain && rows.measured > 0 && !self.follows() {
             let message = "follow the states of an uncertain plant, for which no plan accounts yet";
             found.push(refused("measured", message.into()));
         }
         let is_erring = !rows.errors.is_exact() || plans.errors.iter().any(|error| *error > 0.0);
-        for slot in &rows.slots {
+        for (barrier, _) in &plans.motions {
+            if rows.slots.get(*barrier).is_none_or(|slot| slot.source.follows().is_none()) {
+                let message = format!("is of barrier {barrier}, which follows no point");
+                found.push(refused("motion", message));
+            }
+        }
+        let states = self.model_states();
+        for (i, slot) in rows.slots.iter().enumerate() {
             let mut refuse =
                 |field: &str, message: String| found.push(refused(field, message).within(&slot.name));
             let settings = slot.promise.settings();
@@ -314,16 +380,28 @@ impl Filter {
             if is_erring && slot.end == End::OnArrival {
                 refuse("end", "is on arrival, which a measurement with errors does not tell".into());
             }
-            if slot.source.predict().is_none() {
+            if let Some(follows) = slot.source.follows() {
+                match plans.motion_of(i) {
+                    None => refuse("motion", "is not declared: how the point moves that it follows".into()),
+                    Some(motion) if motion != Motion::default() && follows.steepness().is_none() => {
+                        refuse("motion", "needs a set whose h changes by a bounded amount per m".into());
+                    }
+                    _ => {}
+                }
+            } else if slot.source.predict().is_none() {
                 refuse("source", "has no model to run ahead".into());
-            } else if plans.horizon.is_none() && slot.end == End::Never && leaves(slot, rows.state_dim) {
+            } else if self.follows() && slot.source.state_dim() > states {
+                refuse("source", "depends on what is measured beside the plant, and follows no point".into());
+            } else if plans.horizon.is_none() && slot.end == End::Never && leaves(slot, states) {
                 let message = "moves with time, so that no plan ends; with a horizon one may end earlier";
                 refuse("source", message.into());
             }
         }
         found.extend(one_plant(rows).err());
         // Measured quantities, and a source without a model, were named above.
-        if rows.measured == 0 && rows.slots.iter().all(|slot| slot.source.predict().is_some()) {
+        if (rows.measured == 0 || self.follows())
+            && rows.slots.iter().all(|slot| slot.source.predict().is_some())
+        {
             found.extend(self.uncertainty(plans).err());
         }
         found
@@ -335,7 +413,7 @@ impl Filter {
     ///
     /// A slice of the wrong length; a source without derivatives on enclosures.
     fn uncertainty(&self, plans: &Plans) -> Result<Option<Uncertainty>, Error> {
-        let Rows { state_dim, input_dim, errors, slots, .. } = &self.rows;
+        let (state_dim, Rows { input_dim, errors, slots, .. }) = (&self.model_states(), &self.rows);
         if !plans.rates.is_empty() {
             length("uncertain_rates", plans.rates.len(), *state_dim)?;
         }
@@ -352,7 +430,13 @@ impl Filter {
         let own = plans.errors.iter().copied().chain(core::iter::repeat(0.0));
         let uncertainty = Uncertainty {
             rates: rates.chain(core::iter::repeat(0.0)).take(*state_dim).collect(),
-            errors: errors.sizes(*state_dim).into_iter().zip(own).map(|(rows, own)| rows.max(own)).collect(),
+            errors: errors
+                .sizes(self.rows.state_dim)
+                .into_iter()
+                .zip(own)
+                .map(|(rows, own)| rows.max(own))
+                .take(*state_dim)
+                .collect(),
             gains: gains.chain(core::iter::repeat([1.0; 2])).take(*input_dim).collect(),
             lags: plans.lags.iter().copied().chain(core::iter::repeat([0.0; 2])).take(*input_dim).collect(),
             jitter: plans.jitter,
@@ -363,6 +447,9 @@ impl Filter {
         let (x, u) = (alloc::vec![Second::from(0.0); *state_dim], alloc::vec![Second::from(0.0); *input_dim]);
         let mut rates = x.clone();
         let lacks = |slot: &&BarrierSlot| {
+            if let Some(follows) = slot.source.follows() {
+                return !follows.alone().second_rates(&x, &u, &mut rates);
+            }
             slot.source.predict().is_none_or(|model| {
                 !model.second_rates(&x, &u, &mut rates) || model.second_value(Interval::ALL, &x).is_none()
             })
@@ -412,6 +499,8 @@ impl Filter {
 /// The plans of a filter, and the assurance reported at the last sample.
 pub(super) struct Backup {
     plans: Plans,
+    /// Number of states of the model.
+    states: usize,
     /// The bounds of the model's inputs; at a sample those of an integrated one are tighter.
     bounds: Bounds,
     /// What is not known of the plant.
@@ -434,9 +523,10 @@ struct Preview {
 }
 
 impl Backup {
-    fn new(plans: Plans, bounds: Bounds, uncertainty: Option<Uncertainty>) -> Self {
+    fn new(plans: Plans, states: usize, bounds: Bounds, uncertainty: Option<Uncertainty>) -> Self {
         Self {
             plans,
+            states,
             bounds,
             uncertainty,
             preview: None,
@@ -457,6 +547,8 @@ impl Backup {
             bounds: &self.bounds,
             uncertainty: self.uncertainty.as_ref(),
             measured: None,
+            states: self.states,
+            courses: &[],
         }
     }
 
@@ -485,13 +577,22 @@ impl Backup {
     ) {
         let hold = self.planned_hold(hold, integrator.is_some());
         let planning = self.planning((rows, integrator));
-        let measured = &planning.state(x)[..];
+        let (measured, courses) = (&planning.state(x)[..], planning.courses(t, x));
         let (acts, x) = planning.acts(t, measured);
-        let Self { plans, bounds, uncertainty, assurance, piece, .. } = self;
-        let uncertainty = uncertainty.as_ref();
-        let measured = (t, measured);
-        let mut decision =
-            Decision { rows, integrator, plans, bounds, uncertainty, measured, assurance, piece };
+        let Self { plans, states, bounds, uncertainty, assurance, piece, .. } = self;
+        let (states, uncertainty, measured) = (*states, uncertainty.as_ref(), (t, measured));
+        let mut decision = Decision {
+            rows,
+            integrator,
+            plans,
+            bounds,
+            uncertainty,
+            measured,
+            states,
+            courses,
+            assurance,
+            piece,
+        };
         decision.sample(At { t: acts, hold, x: &x }, u_ref, u);
         rows.workspace.report.assurance = Some(self.assurance);
     }
@@ -540,7 +641,7 @@ impl Backup {
     /// A plan of another filter, or one that is damaged.
     pub(super) fn check(&self, rows: &Rows, state: &FilterState) -> Result<(), Error> {
         let is_fresh = state.time.is_none();
-        state.plan.check([rows.state_dim, rows.input_dim], rows.slots.len(), is_fresh, self.plans.horizon)
+        state.plan.check([self.states, rows.input_dim], rows.slots.len(), is_fresh, self.plans.horizon)
     }
 
     /// Turns the derivative `out` of the rows' answer into that of the input actually applied; `inside` is the model's.
@@ -561,7 +662,7 @@ impl Backup {
         let planning = self.planning((rows, integrator));
         let wished = planning.moves(hold, u_ref, direction.u);
         let du = core::array::from_fn(|i| if held[i] { 0.0 } else { part * out.u[i] + wish * wished[i] });
-        let x = &planning.state(x)[..];
+        let x = &planning.inside(x)[..];
         let dx = &planning.direction(direction.x)[..];
         rows.carry(t, (x, dx), (&inside[..rows.input_dim], du), out).err()
     }
@@ -596,7 +697,10 @@ fn leaves(slot: &BarrierSlot, states: usize) -> bool {
 
 /// Checks that all barriers are along one plant: one plan serves all of them.
 fn one_plant(rows: &Rows) -> Result<(), Error> {
-    let plant = |slot: &BarrierSlot| slot.source.shared().map(SharedPlant::plant);
+    let plant = |slot: &BarrierSlot| match slot.source.follows() {
+        Some(follows) => Some(follows.plant()),
+        None => slot.source.shared().map(SharedPlant::plant),
+    };
     let mut modelled = rows.slots.iter().filter(|slot| slot.source.predict().is_some());
     let Some(first) = modelled.next() else { return Ok(()) };
     match modelled.find(|slot| plant(slot).is_none() || plant(slot) != plant(first)) {

@@ -2,6 +2,7 @@
 //! remembered.
 
 use alloc::vec::Vec;
+use core::ops::Deref;
 
 use super::Plans;
 use super::settings::{DECISIONS, DecisionSettings};
@@ -12,8 +13,8 @@ use crate::filter::rows::{BarrierSlot, Rows};
 use crate::filter::{Begin, End, Integration, Strictness};
 use crate::lie::Predict;
 use crate::plan::{
-    BackupPlan, Failure, Integral, Limit, Planner, Requirement, TOLERANCES, Uncertain, Uncertainty, narrowed,
-    slopes,
+    BackupPlan, Course, Failure, Integral, Limit, Motion, Moving, Planner, Requirement, TOLERANCES,
+    Uncertain, Uncertainty, narrowed, slopes,
 };
 use crate::qp::Bounds;
 
@@ -30,6 +31,27 @@ pub struct Planning<'a> {
     pub(super) uncertainty: Option<&'a Uncertainty>,
     /// Time and model state of the sample from which a plan is sought, if its input acts later.
     pub(super) measured: Option<(f64, &'a [f64])>,
+    /// Number of states of the model; measured points, which follow them in x, do not count.
+    pub(super) states: usize,
+    /// The measurements on which plans rest: of the point of each barrier that follows one. Empty for a plant alone.
+    pub(super) courses: &'a [Option<Course>],
+}
+
+/// A barrier along the plant, for prediction.
+pub(super) enum Model<'a> {
+    Own(&'a dyn Predict),
+    Moving(Moving<'a>),
+}
+
+impl<'a> Deref for Model<'a> {
+    type Target = dyn Predict + 'a;
+
+    fn deref(&self) -> &Self::Target {
+        match self {
+            Self::Own(model) => *model,
+            Self::Moving(moving) => moving,
+        }
+    }
 }
 
 impl<'a> Planning<'a> {
@@ -55,7 +77,40 @@ impl<'a> Planning<'a> {
 
     /// The model's state for the measured `x`.
     pub(super) fn state(&self, x: &[f64]) -> Vec<f64> {
+        let mut inside = self.inside(x);
+        inside.truncate(self.states);
+        inside
+    }
+
+    /// What the rows know of the measured `x`: the state, and the points that follow it.
+    pub(super) fn inside(&self, x: &[f64]) -> Vec<f64> {
         self.with(x, self.rows.state.integrated)
+    }
+
+    /// The points in `x`, measured at `t`.
+    pub(super) fn courses(&self, t: f64, x: &[f64]) -> Vec<Option<Course>> {
+        if self.states == self.rows.state_dim {
+            return Vec::new();
+        }
+        let inside = self.inside(x);
+        let course = |slot: &BarrierSlot| {
+            let first = slot.source.follows()?.first();
+            Some(Course { since: t, point: core::array::from_fn(|i| inside[first + i]) })
+        };
+        self.rows.slots.iter().map(course).collect()
+    }
+
+    /// How far the point of a barrier has strayed since the measurement on which the plan rests: the first that is farther
+    /// away than it can be.
+    pub(super) fn strayed(&self, before: &[Option<Course>]) -> Option<Failure> {
+        let beyond = |barrier: usize| {
+            let (before, now) = (before.get(barrier).copied().flatten()?, self.courses[barrier]?);
+            let round_off = DECISIONS.covered * now.point[..2].iter().map(|c| 1.0 + c.abs()).sum::<f64>();
+            let beyond = before.strays(&self.plans.motion_of(barrier)?, &now);
+            // NaN has strayed.
+            (beyond > round_off || beyond.is_nan()).then_some(Failure::Strays { barrier, beyond })
+        };
+        (0..self.courses.len()).find_map(beyond)
     }
 
     /// When in s an input of a sample at `t` begins to act, and the model's state there: `x`, moved on by the delay under the
@@ -63,9 +118,9 @@ impl<'a> Planning<'a> {
     pub(super) fn acts(&self, t: f64, x: &[f64]) -> (f64, Vec<f64>) {
         let (mut x, delay) = (x.to_vec(), self.rows.delay);
         if delay > 0.0
-            && let Some(plant) = self.models().next()
+            && let Some(plant) = self.plant()
         {
-            let (dims, u) = ([self.rows.state_dim, self.rows.input_dim], self.rows.acting());
+            let (dims, u) = ([self.states, self.rows.input_dim], self.rows.acting());
             Planner::new(plant, dims, self.bounds, &[], delay, 1.0).run(&mut x, &u[..dims[1]]);
         }
         (t + delay, x)
@@ -166,9 +221,35 @@ impl<'a> Planning<'a> {
         self.integrator.map(|own| Integral { state: own.of.state, input: own.of.input })
     }
 
+    /// The plant, for prediction.
+    fn plant(&self) -> Option<&'a dyn Predict> {
+        let alone = |slot: &'a BarrierSlot| match slot.source.follows() {
+            Some(follows) => Some(follows.alone()),
+            None => slot.source.predict(),
+        };
+        self.rows.slots.iter().find_map(alone)
+    }
+
     /// Every barrier along the plant, for prediction.
-    pub(super) fn models(&self) -> impl Iterator<Item = &'a dyn Predict> + use<'a> {
-        self.rows.slots.iter().filter_map(|slot| slot.source.predict())
+    pub(super) fn models(&self) -> impl Iterator<Item = Model<'a>> + use<'a> {
+        self.models_within(|motion| motion)
+    }
+
+    /// The same if no barrier that follows a point is farther away than where it may be seen: what is missed in them is
+    /// missed for certain.
+    pub(super) fn models_seen(&self) -> impl Iterator<Item = Model<'a>> + use<'a> {
+        self.models_within(|motion| Motion { position_error: -motion.position_error, ..Motion::default() })
+    }
+
+    fn models_within(&self, change: fn(Motion) -> Motion) -> impl Iterator<Item = Model<'a>> + use<'a> {
+        let (courses, plans) = (self.courses, self.plans);
+        self.rows.slots.iter().enumerate().filter_map(move |(i, slot)| match slot.source.follows() {
+            Some(follows) => {
+                let course = courses.get(i).copied().flatten()?;
+                Moving::new(follows, course, &change(plans.motion_of(i)?)).map(Model::Moving)
+            }
+            None => slot.source.predict().map(Model::Own),
+        })
     }
 
     /// The promises from `x` at `t`, where the input of the sample begins to act. Each deadline counts from the sample itself,
@@ -179,7 +260,8 @@ impl<'a> Planning<'a> {
         x: &[f64],
         factor: impl Fn(&BarrierSlot) -> f64,
     ) -> Vec<Option<Promise>> {
-        let promise = |(slot, model): (&BarrierSlot, &dyn Predict)| {
+        let promise = |(slot, model): (&BarrierSlot, Model<'_>)| {
+            let model = &*model;
             // Not the h of the report, which is missing if u_ref is NaN.
             let h = model.value(t, x);
             // Slightly earlier, so that round-off of a time leaves no gap.
@@ -274,6 +356,8 @@ impl<'a> Planning<'a> {
     pub(super) fn is_ruled_out(&self, promises: &[Option<Promise>], t: f64, x: &[f64]) -> bool {
         promises.iter().enumerate().any(|(i, promise)| {
             let after = promise.filter(|p| p.from > t && p.from.is_finite()).map(|p| p.from - t);
+            // Where a point will be is not known to the rows.
+            let after = after.filter(|_| self.rows.slots[i].source.follows().is_none());
             after.is_some_and(|after| self.rows.is_ruled_out(i, (t, x), after))
         })
     }
@@ -286,12 +370,15 @@ impl<'a> Planning<'a> {
         u: &[f64],
         f: impl FnOnce(&Planner<'_>) -> Result<R, Failure>,
     ) -> Result<R, Failure> {
-        let mut requirements: Vec<Requirement<'_>> = self
-            .models()
+        let Some(plant) = self.plant() else { return Err(Failure::Nothing) };
+        let models: Vec<Model<'_>> = self.models().collect();
+        let mut requirements: Vec<Requirement<'_>> = models
+            .iter()
             .zip(promises)
             .enumerate()
             .filter_map(|(barrier, (model, promise))| {
                 let Promise { from, until, margin, firm, reserve } = (*promise)?;
+                let model = &**model;
                 Some(Requirement { barrier, is_limit: false, model, from, until, margin, firm, reserve })
             })
             .collect();
@@ -299,7 +386,7 @@ impl<'a> Planning<'a> {
             return Err(Failure::Nothing);
         }
         let size = u.iter().fold(1.0, |m: f64, u| m.max(2.0 * u.abs()));
-        let (plant, dims) = (requirements[0].model, [self.rows.state_dim, self.rows.input_dim]);
+        let dims = [self.states, self.rows.input_dim];
         let limits = self.limits(plant);
         requirements.extend(limits.iter().zip(promises.len()..).map(|(limit, barrier)| {
             let (from, until) = (t, f64::INFINITY);
@@ -369,7 +456,7 @@ impl<'a> Planning<'a> {
         step: f64,
     ) -> Vec<(f64, Vec<f64>, [f64; MAX_INPUTS])> {
         let (mut at, mut x, mut trajectory) = (t, x.to_vec(), Vec::new());
-        let Some(plant) = self.models().next() else { return trajectory };
+        let Some(plant) = self.plant() else { return trajectory };
         for (end, u) in &backup_plan.inputs {
             let (begin, steps) = (at, ((end - at) / step) as usize + 1);
             for k in 1..=steps {

@@ -1,5 +1,7 @@
 //! A sample of a filter with plans: what is promised, whether it is kept, and the input that has a plan behind it.
 
+use alloc::vec::Vec;
+
 use super::choice::{ChoiceMemory, Chosen, Piece, Wish};
 use super::deviation::Deviation;
 use super::first::{First, least_factor};
@@ -12,7 +14,7 @@ use crate::convergence::FixedTimeState;
 use crate::filter::integrator::Integrator;
 use crate::filter::rows::{BarrierSlot, End, Rows, Workspace};
 use crate::filter::{Infeasible, Phase, Status};
-use crate::plan::{Failure, Plan, Planner, SearchProgress, TOLERANCES, Uncertainty, slopes};
+use crate::plan::{Course, Failure, Plan, Planner, SearchProgress, TOLERANCES, Uncertainty, slopes};
 use crate::qp::Bounds;
 use crate::scalar::all_finite;
 
@@ -26,6 +28,9 @@ pub(super) struct Decision<'a> {
     pub(super) uncertainty: Option<&'a Uncertainty>,
     /// Time and state of the sample.
     pub(super) measured: (f64, &'a [f64]),
+    /// Number of states of the model, and the points measured at this sample.
+    pub(super) states: usize,
+    pub(super) courses: Vec<Option<Course>>,
     pub(super) assurance: &'a mut Assurance,
     /// How the input varies with the sample.
     pub(super) piece: &'a mut Piece,
@@ -41,9 +46,17 @@ pub(super) struct At<'a> {
 
 impl Decision<'_> {
     fn planning(&self) -> Planning<'_> {
-        let Self { rows, integrator, plans, bounds, uncertainty, measured, .. } = self;
-        let measured = Some(*measured);
-        Planning { rows, integrator: *integrator, plans, bounds, uncertainty: *uncertainty, measured }
+        let Self { rows, integrator, plans, bounds, uncertainty, measured, states, courses, .. } = self;
+        Planning {
+            rows,
+            integrator: *integrator,
+            plans,
+            bounds,
+            uncertainty: *uncertainty,
+            measured: Some(*measured),
+            states: *states,
+            courses,
+        }
     }
 
     fn before(&self) -> &PlanState {
@@ -72,7 +85,8 @@ impl Decision<'_> {
         }
         let mut rows = [0.0; MAX_INPUTS];
         rows[..u.len()].copy_from_slice(u);
-        let is_valid = t.is_finite() && all_finite(x);
+        let are_points = self.courses.iter().flatten().all(|course| all_finite(&course.point));
+        let is_valid = t.is_finite() && all_finite(x) && are_points;
         if t.is_finite() && (is_valid || self.now().sample.is_some()) {
             self.next().arrived = self.planning().arriving(t);
             self.see(t, is_valid.then_some(x));
@@ -159,8 +173,9 @@ impl Decision<'_> {
         });
         match found {
             Ok((factor, First { promises, plan, is_old })) => {
+                let courses = self.courses.clone();
                 let next = self.next();
-                (next.promises, next.plan) = (promises, plan);
+                (next.promises, next.plan, next.courses) = (promises, plan, courses);
                 next.deviation = Deviation::from(t, x);
                 next.memory = ChoiceMemory::beside(&next.plan.backup_plan);
                 self.prolong_next(t);
@@ -261,7 +276,7 @@ impl Decision<'_> {
         if self.uncertainty.is_some() && *status == AssuranceStatus::Assured {
             return None;
         }
-        let promises = self.now().promises.iter().zip(self.planning().models());
+        let promises = self.now().promises.iter().zip(self.planning().models_seen());
         promises.enumerate().find_map(|(barrier, (promise, model))| {
             let Promise { from, until, .. } = (*promise)?;
             let h = model.value(t, x);
@@ -287,7 +302,13 @@ impl Decision<'_> {
     }
 
     /// Why the plant is not the one that was declared, if the last plan was for an uncertain one.
-    fn undeclared(&self, At { t, hold, x }: At<'_>, u: &[f64]) -> Option<Failure> {
+    fn undeclared(&mut self, At { t, hold, x }: At<'_>, u: &[f64]) -> Option<Failure> {
+        // A point that strayed once is not trusted before it moves as declared again.
+        if let Some(failure) = self.planning().strayed(&self.before().courses) {
+            let courses = self.courses.clone();
+            self.next().courses = courses;
+            return Some(failure);
+        }
         if self.uncertainty.is_none() || self.before().status != AssuranceStatus::Assured {
             return None;
         }
@@ -311,7 +332,7 @@ impl Decision<'_> {
                 *promise = None;
                 continue;
             };
-            slopes(model, t, x, &mut slope);
+            slopes(&*model, t, x, &mut slope);
             let falls: f64 = slope.iter().zip(&differs).map(|(slope, differs)| slope.abs() * differs).sum();
             (kept.margin, kept.reserve, kept.firm) = (DECISIONS.gusts * falls, 0.0, t);
         }
@@ -371,11 +392,21 @@ impl Decision<'_> {
             rows: u,
             reached: self.now().promises.iter().flatten().all(|promise| promise.from <= t),
         };
-        let found = planning.planned(&self.now().promises, (t, hold), u, |planner| {
-            let planner = planner.irregular(!is_regular).hurried(planning.plans.search_budget);
-            let chosen = planning.chosen(&planner, (t, x), wish, &mut memory)?;
-            Ok(planning.smoothed(&planner, (t, x), chosen, wish.reached))
-        });
+        let search = |planning: Planning<'_>, memory: &mut ChoiceMemory| {
+            planning.planned(&self.now().promises, (t, hold), u, |planner| {
+                let planner = planner.irregular(!is_regular).hurried(planning.plans.search_budget);
+                let chosen = planning.chosen(&planner, (t, x), wish, memory)?;
+                Ok(planning.smoothed(&planner, (t, x), chosen, wish.reached))
+            })
+        };
+        let mut found = search(planning, &mut memory);
+        let (mut courses, before) = (&self.courses, &self.before().courses);
+        if found.is_err() && !before.is_empty() && before != courses {
+            // With errors, a point measured now might be where one measured before could not.
+            memory = self.now().memory.clone();
+            (found, courses) = (search(Planning { courses: before, ..planning }, &mut memory), before);
+        }
+        let courses = courses.clone();
         match found {
             Ok(chosen) => {
                 let Chosen { driver, piece, share, backup_plan, plan } = chosen;
@@ -389,7 +420,7 @@ impl Decision<'_> {
                 if let Some(plan) = plan {
                     next.plan = plan;
                 }
-                next.plan.backup_plan = backup_plan;
+                (next.plan.backup_plan, next.courses) = (backup_plan, courses);
                 driver
             }
             Err(failure) => self.regain(at, failure, u, is_regular),
@@ -421,10 +452,12 @@ impl Decision<'_> {
                 })
             }
         };
+        let courses = self.courses.clone();
         let next = self.next();
         next.regained = regained;
         match found {
             Ok(plan) => {
+                next.courses = courses;
                 u.copy_from_slice(&plan.backup_plan.inputs[0].1[..u.len()]);
                 (next.plan, next.share) = (plan, 1.0);
                 (next.lost, next.regained) = (None, SearchProgress::default());

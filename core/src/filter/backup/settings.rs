@@ -69,6 +69,8 @@ pub(super) struct DecisionSettings {
     /// How far in s a plan for an uncertain plant reaches past the last deadline and the sample, if nothing else is asked
     /// for.
     pub(super) uncertain_horizon: f64,
+    /// The same where a barrier follows a measured point, which may be nearer the later it is.
+    pub(super) following_horizon: f64,
     /// The part of it that is left when another plan is sought.
     pub(super) nearly_over: f64,
 
@@ -164,6 +166,8 @@ pub(super) const DECISIONS: DecisionSettings = DecisionSettings {
     // The tube of a vehicle at rest grows slowly, and every sample that lets another input pass begins a new one. With more, a
     // search takes longer; with less, a promise ends sooner if no other input passes any more.
     uncertain_horizon: 3.0,
+    // With the reserve of a search, as far as above. A point that may accelerate soon may be anywhere.
+    following_horizon: 2.0,
     // The law prolongs a plan long before (`Planner::prolonged`). With more, searches come early; with less, they have fewer
     // samples to find a plan.
     nearly_over: 0.6,

@@ -7,7 +7,7 @@ use super::choice::ChoiceMemory;
 use super::deviation::Deviation;
 use super::settings::DECISIONS;
 use crate::error::{Error, ErrorKind, length};
-use crate::plan::{BackupPlan, Failure, Plan, SearchProgress, TOLERANCES};
+use crate::plan::{BackupPlan, Course, Failure, Plan, SearchProgress, TOLERANCES};
 use crate::scalar::all_finite;
 
 /// The part of a [`FilterState`](crate::filter::FilterState) that belongs to plans: the promises and the plan that keeps
@@ -42,6 +42,8 @@ pub struct PlanState {
     /// What may arrive of each input at that time, before the input of that sample, if it is followed late: the least and the
     /// largest.
     pub(super) arrived: Vec<[f64; 2]>,
+    /// The measurements on which the plan rests: of the point of each barrier that follows one; empty for a plant alone.
+    pub(super) courses: Vec<Option<Course>>,
     /// The time in s between the last two samples, and how many intervals in a row have been about as long; 0 before there
     /// is one.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
@@ -167,6 +169,7 @@ impl PlanState {
             prolong_at,
             sample,
             arrived,
+            courses,
             interval,
             ..
         } = self;
@@ -205,6 +208,10 @@ impl PlanState {
             }
             if !arrived.is_empty() && arrived.len() != dims[1] || !all_finite(arrived.as_flattened()) {
                 return refuse("arrived", "is not of a plant with as many inputs, or not finite");
+            }
+            let is_course = |course: &Course| course.since.is_finite() && all_finite(&course.point);
+            if ![0, barriers].contains(&courses.len()) || !courses.iter().flatten().all(is_course) {
+                return refuse("courses", "are not of as many barriers, or not finite");
             }
             if !interval.is_finite() {
                 return refuse("interval", "is not finite");
