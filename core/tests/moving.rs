@@ -326,6 +326,25 @@ fn joining(draws: &mut Draws, motion: Motion) -> Case {
     Case { x, goal: None, leader: Some(leader), others, motion, deadline: 6.0, delay: 0.0, uncertain: 0.0 }
 }
 
+/// Others all around, and nowhere to go: u_ref drives straight on.
+fn among(draws: &mut Draws, motion: Motion) -> Case {
+    let others = (0..3)
+        .map(|_| {
+            let ([x, y], [v_x, v_y]) = (draws.direction(1.0), draws.direction(1.0));
+            let (far, speed) = (draws.within(5.0, 10.0), draws.within(0.0, 1.2));
+            [far * x, far * y, speed * v_x, speed * v_y]
+        })
+        .collect();
+    let x = [0.0, 0.0, draws.within(-0.4, 0.4), draws.within(0.0, 2.0)];
+    Case { x, goal: None, leader: None, others, motion, deadline: 0.0, delay: 0.0, uncertain: 0.0 }
+}
+
+#[test]
+fn a_vehicle_among_others_stays_clear_for_as_long_as_it_says() {
+    is_kept(&tally("unicycle", &Unicycle, 8.0, 10, |draws| among(draws, GENTLE)));
+    is_kept(&tally("point mass", &PointMass, 8.0, 11, |draws| as_point(among(draws, GENTLE))));
+}
+
 #[test]
 fn others_that_accelerate_are_kept_clear_of() {
     is_kept(&tally("unicycle", &Unicycle, 9.0, 1, |draws| crossing(draws, GENTLE)));

@@ -27,7 +27,7 @@ const MAGIC: [u8; 8] = *b"PUNCTUAL";
 
 /// Version of the layout, to be increased with every change of it. (The GUID changes with the version of the
 /// library.)
-const VERSION: u32 = 11;
+const VERSION: u32 = 12;
 
 const GUID: usize = 38;
 const HEADER: usize = MAGIC.len() + u32::SIZE + GUID + u64::SIZE;

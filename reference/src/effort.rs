@@ -121,7 +121,8 @@ impl Running<'_> {
         self.judges.iter().any(lost)
     }
 
-    /// Moves the plant over the period that begins at `t`; `last` is the input of the previous period.
+    /// Moves the plant over the period that begins at `t`, and the points that follow its states in `x` at their velocities;
+    /// `last` is the input of the previous period.
     fn advance(
         &mut self,
         filter: &Filter,
@@ -138,7 +139,12 @@ impl Running<'_> {
                 let cuts = deadlines.iter().map(|deadline| start.0 + deadline - t).chain([delay]);
                 let to = cuts.filter(|cut| *cut > at + same && *cut < end - same).fold(end, f64::min);
                 let u = if to <= delay + same { last } else { u };
-                plant.rk4_step(&mut x[..plant.state_dim()], u, to - at)?;
+                let (states, points) = x.split_at_mut(plant.state_dim());
+                plant.rk4_step(states, u, to - at)?;
+                for point in points.chunks_exact_mut(4) {
+                    point[0] += point[2] * (to - at);
+                    point[1] += point[3] * (to - at);
+                }
                 at = to;
                 if at < step {
                     self.instant(filter, t + at, x)?;

@@ -53,6 +53,9 @@ struct PlanReport {
     /// Whether it is for an uncertain plant.
     #[serde(skip)]
     covers: bool,
+    /// Whether it accounts for points that move by themselves.
+    #[serde(skip)]
+    covers_points: bool,
     /// The largest magnitude of each input, with its unit and bounds.
     inputs: Vec<(String, f64, String, [f64; 2])>,
     /// The barrier with the least h above its margin, the time in s, that difference, and its unit.
@@ -98,6 +101,7 @@ pub(super) fn find(
             .then(|| backup_plan.inputs.last().map_or(t, |(end, _)| *end)),
         until: Some(backup_plan.until).filter(|until| until.is_finite()),
         covers: !c.covered().is_empty(),
+        covers_points: !c.covered_points().is_empty(),
         inputs: inputs
             .iter()
             .enumerate()
@@ -250,8 +254,11 @@ impl BackupPlanReport {
             let ending = match (plan.at_equilibrium_from, plan.until) {
                 (Some(from), _) => format!("at an equilibrium from {} s", number(from)),
                 (None, until) => {
-                    let ending =
-                        if plan.covers { "with every plant that it covers" } else { "ending in motion" };
+                    let ending = match (plan.covers, plan.covers_points) {
+                        (true, _) => "with every plant that it covers",
+                        (false, true) => "however the centres move that it covers",
+                        (false, false) => "ending in motion",
+                    };
                     format!("until {} s, {ending}", number_below(until.unwrap_or(f64::NAN)))
                 }
             };

@@ -75,6 +75,9 @@ struct FilterReport {
     no_plans: Option<String>,
     /// For which plants plans keep the promises; empty if for the model alone.
     covers: Vec<String>,
+    /// However which points move.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    covers_points: Vec<String>,
     barriers: Vec<BarrierReport>,
     /// The start given, by state.
     start: Option<Vec<(String, f64)>>,
@@ -528,6 +531,7 @@ fn filter(
         step,
         no_plans: (!c.is_assured()).then(|| c.unassured()),
         covers: if c.is_assured() { c.covered() } else { Vec::new() },
+        covers_points: if c.is_assured() { c.covered_points() } else { Vec::new() },
         barriers,
         start: start.map(|x0| measured(c).into_iter().zip(x0).collect()),
         status,
@@ -721,6 +725,9 @@ fn filter_text(report: &FilterReport) -> String {
                 .to_owned(),
             covers => format!("covers: {}", covers.join("; ")),
         });
+        if !report.covers_points.is_empty() {
+            lines.push(format!("beside it: {}", report.covers_points.join("; ")));
+        }
     }
     if let Some(start) = &report.start {
         let state: Vec<_> =

@@ -55,6 +55,7 @@ use alloc::vec::Vec;
 use crate::lie::Predict;
 use crate::scalar::all_finite;
 use law::{Reference, StoppingController};
+pub(crate) use settings::SETTINGS;
 
 /// What a plan has to keep: h(t, x(t)) ≥ `margin` for `from` ≤ t < `until`.
 #[derive(Clone, Copy)]

@@ -52,6 +52,9 @@ pub(crate) struct Course {
     pub(crate) since: f64,
     /// Its two coordinates in m, and its velocity in m/s.
     pub(crate) point: [f64; 4],
+    /// Until when, in s, a plan keeps its barrier; infinite if that is not yet known.
+    #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
+    pub(crate) until: f64,
 }
 
 impl Course {

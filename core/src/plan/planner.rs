@@ -209,19 +209,11 @@ impl<'a> Planner<'a> {
         let paced = Self { period: self.pace(), ..*self };
         let to = |horizon| paced.search_to(horizon, t, x);
         match (self.horizon, self.before.map(|before| before.until.is_finite())) {
-            (None, _) => to(None),
-            (Some(_), _) if self.moves_on(t, x) => to(self.horizon),
-            (_, Some(false)) => to(None),
+            (None, _) | (_, Some(false)) => to(None),
             (Some(_), None) => to(None).or_else(|_| to(self.horizon)),
             // A plan that continued without an equilibrium most likely does so again.
             (Some(_), Some(true)) => to(self.horizon).or_else(|failure| to(None).map_err(|_| failure)),
         }
-    }
-
-    /// Whether a set that is required for ever leaves every state: no plan ends at an equilibrium then.
-    fn moves_on(&self, t: f64, x: &[f64]) -> bool {
-        let leaves = |r: &Requirement<'_>| r.model.lowest_from(t, x) == Some(f64::NEG_INFINITY);
-        self.requirements.iter().any(|r| r.until == f64::INFINITY && leaves(r))
     }
 
     /// Searches for a plan that ends at an equilibrium, or at a horizon.

@@ -128,7 +128,8 @@ impl FilterConfiguration {
     /// Whether its plans may end before the end of time, in motion or with an uncertain plant, so that it reports until when
     /// it promises.
     pub fn ends_plans(&self) -> bool {
-        self.is_assured() && (self.plan_horizon.is_some() || self.declares_uncertainty())
+        let follows = || self.barrier.iter().any(|barrier| barrier.shape.followed().is_some());
+        self.is_assured() && (self.plan_horizon.is_some() || self.declares_uncertainty() || follows())
     }
 
     /// Why the filter follows no plans, in words; empty where it does.
@@ -215,9 +216,14 @@ impl FilterConfiguration {
             .search_budget(self.search_budget.unwrap_or(Plans::SEARCH_BUDGET))
             .apart(self.apart());
         let plans = match self.leaves_errors_to_plans() {
-            true => plans.measurement_errors(&self.errors()),
+            true => plans.measurement_errors(&self.errors()[..self.plant.states().len()]),
             false => plans,
         };
+        let motions = self.barrier.iter().map(|barrier| barrier.shape.followed()?.motion()).enumerate();
+        let plans = motions.fold(plans, |plans, (barrier, motion)| match motion {
+            Some(motion) => plans.motion(barrier, motion),
+            None => plans,
+        });
         match &self.uncertainty {
             Some(uncertainty) => uncertainty.declared(&self.plant, plans),
             None => plans,
@@ -230,11 +236,12 @@ impl FilterConfiguration {
             return Some(format!("barrier {} has no model to run ahead", barrier.name));
         }
         let mut found = Vec::new();
-        let follows = self.barrier_inputs();
-        if let Some(input) = follows.first() {
+        let unknown = self.barrier.iter().find(|b| b.shape.followed().is_some_and(|at| at.motion().is_none()));
+        if let Some(barrier) = unknown {
             found.push(format!(
-                "a barrier follows {}, which is moved from outside, so that no plan can predict it",
-                input.name
+                "{} follows a centre that is moved from outside, and no plan can predict it without its `acceleration`, by how \
+                 much its velocity may change",
+                barrier.name
             ));
         }
         // `filter` may be the rows alone, before the integrator is put behind them.
@@ -248,7 +255,7 @@ impl FilterConfiguration {
                 let name = field.strip_suffix(key)?.strip_suffix('.')?;
                 self.barrier.iter().find(|barrier| barrier.name == name)
             };
-            if ["integrator", "measured"].contains(&field) {
+            if ["integrator", "measured"].contains(&field) || of("motion").is_some() {
                 // Named above.
             } else if of("disturbance").is_some() {
                 found.push(format!(
@@ -257,12 +264,9 @@ impl FilterConfiguration {
             } else if let Some((name, after)) = of("begin").and_then(|b| Some((&b.name, b.after.as_ref()?))) {
                 found.push(format!("{name}.after is {after:?}, and no plan predicts when that is reached"));
             } else if let Some(barrier) = of("source") {
-                // No key has this name. What follows another thing moves as that does; what moves by itself wants the key of a
-                // horizon.
-                if follows.is_empty() {
-                    let key = if message.starts_with("moves") { " (`plan_horizon`)" } else { "" };
-                    found.push(format!("{} {message}{key}", barrier.name));
-                }
+                // No key has this name. What moves wants the key of a horizon.
+                let key = if message.starts_with("moves") { " (`plan_horizon`)" } else { "" };
+                found.push(format!("{} {message}{key}", barrier.name));
             } else {
                 found.push(format!("{field} {message}"));
             }

@@ -707,11 +707,14 @@ impl FilterConfiguration {
         self.plant.states().into_iter().filter(|s| !integrated(s)).collect()
     }
 
-    /// Of the numbers `x`, one for each state of the plant, those that are [measured](Self::measured_states).
+    /// Of the numbers `x`, one for each state of the plant, those that are [measured](Self::measured_states); and those of
+    /// barriers behind them.
     pub fn measured(&self, x: &[f64]) -> Vec<f64> {
         let states = self.plant.states();
+        let (states_of_x, of_barriers) = x.split_at(states.len().min(x.len()));
         let is_measured = |name: &str| self.integrator.as_ref().is_none_or(|i| i.state != name);
-        x.iter().zip(states).filter(|(_, state)| is_measured(&state.name)).map(|(x, _)| *x).collect()
+        let own = states_of_x.iter().zip(states).filter(|(_, state)| is_measured(&state.name));
+        own.map(|(x, _)| *x).chain(of_barriers.iter().copied()).collect()
     }
 
     /// The bounds of a signal that the filter [hands out](Self::commanded), where it has both.

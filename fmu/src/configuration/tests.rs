@@ -143,12 +143,20 @@ defects! {
     uncertainty_beside_a_delay: UNCERTAIN, "uncertainty =" => "actuation_delay = 0.002\nuncertainty =",
         "uncertainty: only plans account for it, and none are followed: actuation_delay is 0.002, must be <= period = 0.001 for a \
          plan. Change that, or leave `[uncertainty]` out";
+    an_acceleration_of_a_centre_that_is_no_input: UNCERTAIN, "radius = 2.0" => "radius = 2.0\nacceleration = 0.3",
+        "barrier[0].acceleration: is for a centre that is measured: it needs `centre_input = true`";
+    an_error_of_a_centre_without_its_acceleration: UNCERTAIN,
+        "radius = 2.0" => "radius = 2.0\ncentre_input = true\nvelocity_error = 0.3",
+        "barrier[0].velocity_error: needs `acceleration` beside it: only plans account for it";
+    a_negative_acceleration_of_a_centre: UNCERTAIN,
+        "radius = 2.0" => "radius = 2.0\ncentre_input = true\nacceleration = -0.3",
+        "barrier[0].acceleration: is -0.3, must be finite and >= 0";
     uncertainty_beside_a_disturbance: UNCERTAIN, "radius = 2.0" => "radius = 2.0\ndisturbance = 0.2",
         "uncertainty: only plans account for it, and none are followed: goal.disturbance is 0.2, must be 0 for a plan; plans account \
          for `rates` of [uncertainty] in its place. Change that, or leave `[uncertainty]` out";
     uncertainty_beside_an_input_of_a_barrier: UNCERTAIN, "radius = 2.0" => "radius = 2.0\ncentre_input = true",
-        "uncertainty: only plans account for it, and none are followed: a barrier follows goal.centre[1], which is moved from \
-         outside, so that no plan can predict it. Change that, or leave `[uncertainty]` out";
+        "uncertainty: only plans account for it, and none are followed: goal follows a centre that is moved from outside, and no \
+         plan can predict it without its `acceleration`, by how much its velocity may change. Change that, or leave `[uncertainty]` out";
     uncertainty_behind_an_integrator: STEERED,
         "bounds = { beta_rate = [-4.0, 4.0] }" =>
         "bounds = { a = [-4.0, 4.0], beta_rate = [-4.0, 4.0] }\nuncertainty = { rates = { v = 0.1 } }",
@@ -651,6 +659,13 @@ fn what_plans_cover_is_what_the_file_declares() {
     assert!(filter.is_assured() && filter.ends_plans() && filter.warning().is_none());
     let wanted = ["rates v 0.1 m/s2", "measurement errors x_p 0.02 m, theta 0.01 rad", "gain of a 0.9 to 1"];
     assert_eq!(filter.covered(), wanted);
+    // A centre that is measured belongs to its barrier.
+    let centre = "radius = 2.0\ncentre_input = true\nacceleration = 0.3\ncentre_error = 0.02";
+    let follows = read(&UNCERTAIN.replace("radius = 2.0", centre));
+    assert!(follows.is_assured() && follows.ends_plans());
+    let wanted = ["acceleration of the centre of goal 0.3 m/s2, errors 0.02 m"];
+    assert_eq!(follows.covered_points(), wanted);
+    assert!(follows.parameters().iter().any(|row| row.name == "goal.acceleration"));
     // Nothing is nothing, but the FMU has its parameters, and its output of the end.
     let nothing = read(&UNCERTAIN.replace("0.1", "0.0").replace("[0.9, 1.0]", "[1.0, 1.0]"));
     assert!(nothing.covered().is_empty() && nothing.ends_plans());
@@ -780,7 +795,7 @@ fn defaults_are_those_of_the_documentation() {
     let barrier = &c.barrier[0];
     assert_eq!((barrier.rate, barrier.stay_rate), (Automatic(0.0), Automatic(0.0)), "by default");
     assert_eq!(barrier.margin, 0.02, "a hundredth of the radius");
-    let at = Point { centre: [45.0, 44.0], velocity: [0.0; 2], centre_input: false };
+    let at = Point::at([45.0, 44.0]);
     let disc = Shape::Disc { at, radius: 2.0, smoothing: Automatic(0.0) };
     assert_eq!(barrier.shape, disc, "at rest, rounded by its radius");
     assert_eq!((c.name.as_str(), c.direct_feedthrough, c.correction_limit), ("filter", true, 1e6));
@@ -862,7 +877,7 @@ fn defaults_of_the_tables_are_those_of_the_files() {
 }
 
 /// A value of every key that only some shapes have.
-const SHAPE_VALUES: [(&str, &str); 14] = [
+const SHAPE_VALUES: [(&str, &str); 17] = [
     ("centre", "[1.0, 2.0]"),
     ("radius", "1.0"),
     ("half_axes", "[2.0, 1.0]"),
@@ -875,6 +890,9 @@ const SHAPE_VALUES: [(&str, &str); 14] = [
     ("smoothing", "0.5"),
     ("velocity", "[1.0, 0.0]"),
     ("centre_input", "true"),
+    ("acceleration", "0.3"),
+    ("centre_error", "0.1"),
+    ("velocity_error", "0.1"),
     ("angle", "0.5"),
     ("unit", "\"m\""),
 ];

@@ -10,6 +10,7 @@ use super::key::{
     Unit::{Is, Of},
     Value::{Number, NumberByName, Pair, TableByName},
 };
+use super::barrier::BarrierSection;
 use super::names::check_known;
 use super::{ConfigurationError, FilterConfiguration, Parameter, PlantSection, Range, over_seconds};
 use crate::text::{number, quantity};
@@ -255,5 +256,19 @@ impl FilterConfiguration {
             .then(|| format!("steps up to {} of a step late", number(declared.jitter)));
         let rates = rates.map(|(what, sizes)| format!("{what} {sizes}"));
         rates.chain(gains).chain(lags).chain(delay).chain(jitter).collect()
+    }
+
+    /// However which points move plans keep clear of them, or inside: in words.
+    pub fn covered_points(&self) -> Vec<String> {
+        let motion = |barrier: &BarrierSection| {
+            let motion = barrier.shape.followed()?.motion()?;
+            let errors = [(motion.position_error, "m"), (motion.velocity_error, "m/s")];
+            let errors = errors.into_iter().filter(|(error, _)| *error > 0.0);
+            let errors: Vec<_> = errors.map(|(error, unit)| quantity(error, unit)).collect();
+            let errors = if errors.is_empty() { String::new() } else { format!(", errors {}", errors.join(", ")) };
+            let acceleration = quantity(motion.acceleration, "m/s2");
+            Some(format!("acceleration of the centre of {} {acceleration}{errors}", barrier.name))
+        };
+        self.barrier.iter().filter_map(motion).collect()
     }
 }

@@ -31,7 +31,7 @@ impl Planning<'_> {
         let (t, x) = self.acts(t, &measured);
         let promises = own.promises(t, &x, |_| factor);
         own.first(promises, (t, self.plans.period), &x, &[], &DECISIONS.shorter)
-            .map(|first| first.plan.backup_plan)
+            .map(|First { promises, plan, .. }| own.dated(plan.backup_plan, t, &promises))
     }
 
     /// The result of [`Self::plan_from`] for the deadlines themselves, and [`Self::earliest_deadline`], with one search for
@@ -47,7 +47,10 @@ impl Planning<'_> {
         let (acts, state) = self.acts(t, &measured);
         let promises = own.promises(acts, &state, |_| 1.0);
         match own.first(promises, (acts, self.plans.period), &state, &[], &DECISIONS.shorter) {
-            Ok(first) => (Ok(first.plan.backup_plan.clone()), self.least(t, x, longest, Some(first))),
+            Ok(first) => {
+                let plan = own.dated(first.plan.backup_plan.clone(), acts, &first.promises);
+                (Ok(plan), self.least(t, x, longest, Some(first)))
+            }
             Err(failure) => (Err(failure), self.least(t, x, longest, None)),
         }
     }
@@ -119,7 +122,14 @@ impl Planning<'_> {
         };
         let found = first.map(|first| arrived(1.0, first));
         let (factor, plan) = least_factor(self.longest(longest, |_| true), found, find, sooner)?;
-        Some((factor, plan.backup_plan))
+        Some((factor, own.dated(plan.backup_plan, t, &promised(factor))))
+    }
+
+    /// `plan` for `promises` from `t` on, with the time until which it keeps them.
+    fn dated(&self, mut plan: BackupPlan, t: f64, promises: &[Option<Promise>]) -> BackupPlan {
+        let ends = self.rests_on(t, promises).into_iter().flatten().map(|course| course.until);
+        plan.until = ends.fold(plan.until, f64::min);
+        plan
     }
 
     /// The first plan for `promises`: with their reserve; otherwise without; otherwise for deadlines shortened to one of the

@@ -305,8 +305,8 @@ impl Filter {
             return Err(obstacle);
         }
         let uncertainty = self.uncertainty(&plans)?;
-        if self.follows() && plans.horizon.is_none() {
-            // A point comes to no rest.
+        if self.follows() && plans.horizon.is_none() && uncertainty.is_none() {
+            // A set that moves on may have to be followed.
             plans.horizon = Some(DECISIONS.following_horizon);
         }
         let states = self.model_states();
@@ -630,7 +630,7 @@ impl Backup {
     pub(super) fn restart(&mut self, plan: &PlanState) {
         self.preview = None;
         let (status, failure) = (plan.status, plan.failure);
-        let until = plan.backup_plan().map(|backup_plan| backup_plan.until);
+        let until = plan.backup_plan().map(|_| plan.until());
         self.assurance = Assurance { status, driver: Driver::Rows, failure, until, reason: None };
     }
 

@@ -13,7 +13,7 @@ use crate::filter::rows::{BarrierSlot, Rows};
 use crate::filter::{Begin, End, Integration, Strictness};
 use crate::lie::Predict;
 use crate::plan::{
-    BackupPlan, Course, Failure, Integral, Limit, Motion, Moving, Planner, Requirement, TOLERANCES,
+    BackupPlan, Course, Failure, Integral, Limit, Motion, Moving, Planner, Requirement, SETTINGS, TOLERANCES,
     Uncertain, Uncertainty, narrowed, slopes,
 };
 use crate::qp::Bounds;
@@ -95,9 +95,24 @@ impl<'a> Planning<'a> {
         let inside = self.inside(x);
         let course = |slot: &BarrierSlot| {
             let first = slot.source.follows()?.first();
-            Some(Course { since: t, point: core::array::from_fn(|i| inside[first + i]) })
+            let point = core::array::from_fn(|i| inside[first + i]);
+            Some(Course { since: t, point, until: f64::INFINITY })
         };
         self.rows.slots.iter().map(course).collect()
+    }
+
+    /// The measurements on which a plan from `t` on for `promises` rests, each with how far the plan reaches: as far past the
+    /// last deadline and the sample as a search does.
+    pub(super) fn rests_on(&self, t: f64, promises: &[Option<Promise>]) -> Vec<Option<Course>> {
+        let last = promises.iter().flatten().map(|promise| promise.from).filter(|t| t.is_finite());
+        let until = last.fold(t, f64::max) + self.ahead();
+        let dated = |course: &Course| Course { until: course.until.min(until), ..*course };
+        self.courses.iter().map(|course| course.as_ref().map(dated)).collect()
+    }
+
+    /// How far in s past the last deadline and the sample a plan accounts for points.
+    fn ahead(&self) -> f64 {
+        self.plans.horizon.map_or(DECISIONS.uncertain_horizon, |horizon| SETTINGS.ample * horizon)
     }
 
     /// How far the point of a barrier has strayed since the measurement on which the plan rests: the first that is farther
@@ -371,13 +386,14 @@ impl<'a> Planning<'a> {
         f: impl FnOnce(&Planner<'_>) -> Result<R, Failure>,
     ) -> Result<R, Failure> {
         let Some(plant) = self.plant() else { return Err(Failure::Nothing) };
-        let models: Vec<Model<'_>> = self.models().collect();
+        let (models, courses): (Vec<Model<'_>>, _) = (self.models().collect(), self.rests_on(t, promises));
         let mut requirements: Vec<Requirement<'_>> = models
             .iter()
             .zip(promises)
             .enumerate()
             .filter_map(|(barrier, (model, promise))| {
                 let Promise { from, until, margin, firm, reserve } = (*promise)?;
+                let until = courses.get(barrier).copied().flatten().map_or(until, |of| until.min(of.until));
                 let model = &**model;
                 Some(Requirement { barrier, is_limit: false, model, from, until, margin, firm, reserve })
             })
@@ -470,19 +486,22 @@ impl<'a> Planning<'a> {
         trajectory
     }
 
-    /// Whether a plan for an uncertain plant has nearly ended: every new plan postpones the end, and there was none. `None` for
-    /// other plans, and with a horizon of the user's.
+    /// Whether a plan for an uncertain plant, or beside points, has nearly ended: every new plan postpones the end, and there
+    /// was none. `None` for other plans, for those that end in motion, and for an uncertain plant with a horizon of the user's.
     pub(super) fn is_nearly_over(&self, t: f64) -> Option<bool> {
-        let plan = &self.now().plan.backup_plan;
-        let over = t + DECISIONS.nearly_over * DECISIONS.uncertain_horizon;
-        (self.plans.horizon.is_none() && plan.tracking().is_some()).then_some(plan.until <= over)
+        let PlanState { plan, courses, .. } = self.now();
+        let is_beside_points = !courses.is_empty() && !plan.is_finite();
+        let is_uncertain = self.plans.horizon.is_none() && plan.backup_plan.tracking().is_some();
+        let over = t + DECISIONS.nearly_over * self.ahead();
+        (is_beside_points || is_uncertain).then_some(self.now().until() <= over)
     }
 
     /// The time in s at which the filter next tries to prolong a plan that ends at `until`, seen from `t`: when the plan has
     /// become as short as allowed, and then more and more often until its end.
     pub(super) fn next_prolonging(&self, t: f64, until: f64) -> f64 {
-        let Some(horizon) = self.plans.horizon else {
-            let is_over = self.is_nearly_over(t) == Some(true);
+        let is_nearly_over = self.is_nearly_over(t);
+        let Some(horizon) = self.plans.horizon.filter(|_| is_nearly_over.is_none()) else {
+            let is_over = is_nearly_over == Some(true);
             return if is_over { t + DECISIONS.sooner * (until - t) } else { f64::INFINITY };
         };
         let last = self.now().promises.iter().flatten().map(|promise| promise.from).fold(t, f64::max);

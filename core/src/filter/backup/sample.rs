@@ -130,11 +130,10 @@ impl Decision<'_> {
         if self.uncertainty.is_some() && self.now().status != AssuranceStatus::Assured {
             self.next().plan.backup_plan.forget();
         }
-        let PlanState { status, failure, plan, .. } = &self.rows.workspace.next.plan;
-        let is_assured = *status == AssuranceStatus::Assured;
-        (self.assurance.status, self.assurance.failure) = (*status, *failure);
-        self.assurance.until =
-            is_assured.then_some(if is_over { f64::INFINITY } else { plan.backup_plan.until });
+        let next = &self.rows.workspace.next.plan;
+        let is_assured = next.status == AssuranceStatus::Assured;
+        (self.assurance.status, self.assurance.failure) = (next.status, next.failure);
+        self.assurance.until = is_assured.then_some(if is_over { f64::INFINITY } else { next.until() });
         self.assurance.reason = self.assurance.reason.filter(|_| is_assured);
         if is_assured || u != &rows[..u.len()] {
             self.report_on(&rows[..u.len()], u);
@@ -173,7 +172,7 @@ impl Decision<'_> {
         });
         match found {
             Ok((factor, First { promises, plan, is_old })) => {
-                let courses = self.courses.clone();
+                let courses = self.planning().rests_on(t, &promises);
                 let next = self.next();
                 (next.promises, next.plan, next.courses) = (promises, plan, courses);
                 next.deviation = Deviation::from(t, x);
@@ -349,7 +348,7 @@ impl Decision<'_> {
 
     /// Sets when the filter next tries to prolong the current plan.
     fn prolong_next(&mut self, t: f64) {
-        let at = self.planning().next_prolonging(t, self.now().plan.backup_plan.until);
+        let at = self.planning().next_prolonging(t, self.now().until());
         self.next().prolong_at = at;
     }
 
@@ -368,13 +367,15 @@ impl Decision<'_> {
             // A plan that nothing else prolonged may use its reserve up.
             promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);
         }
-        let longer = self
-            .planning()
+        let planning = self.planning();
+        let longer = planning
             .planned(&promises, (t, hold), u, |planner| planner.beyond(&plan.backup_plan).search(t, x))
             .ok()
-            .filter(|longer| longer.backup_plan.until > plan.backup_plan.until);
-        if let Some(longer) = longer {
-            self.next().plan = longer;
+            .map(|plan| PlanState { plan, courses: planning.rests_on(t, &promises), ..PlanState::default() })
+            .filter(|longer| longer.until() > self.now().until());
+        if let Some(PlanState { plan, courses, .. }) = longer {
+            let next = self.next();
+            (next.plan, next.courses) = (plan, courses);
         }
         self.prolong_next(t);
     }
@@ -400,13 +401,32 @@ impl Decision<'_> {
             })
         };
         let mut found = search(planning, &mut memory);
-        let (mut courses, before) = (&self.courses, &self.before().courses);
-        if found.is_err() && !before.is_empty() && before != courses {
-            // With errors, a point measured now might be where one measured before could not.
+        let (promises, before) = (&self.now().promises, &self.before().courses);
+        let (mut courses, mut regained) = (planning.rests_on(t, promises), SearchProgress::default());
+        if found.is_err() && !before.is_empty() && self.before().reaches(t + hold) {
+            // What was known before still holds, until then. Meanwhile another plan is sought that reaches farther.
             memory = self.now().memory.clone();
-            (found, courses) = (search(Planning { courses: before, ..planning }, &mut memory), before);
+            found = search(Planning { courses: before, ..planning }, &mut memory);
+            let plan = &self.now().plan;
+            if found.is_ok() && is_regular && !plan.is_finite() {
+                regained.clone_from(&self.now().regained);
+                let farther = planning.planned(promises, (t, hold), u, |planner| {
+                    let planner = planner.hurried(planning.plans.search_budget);
+                    planner.regained(plan, t, x, &mut regained).map_err(|_| Failure::Nothing)
+                });
+                match farther {
+                    Ok(plan) => {
+                        let backup_plan = plan.backup_plan.clone();
+                        let (driver, piece) = (Driver::Plan, Piece::PLAN);
+                        found = Ok(Chosen { driver, piece, share: 1.0, backup_plan, plan: Some(plan) });
+                        regained = SearchProgress::default();
+                    }
+                    Err(_) => courses.clone_from(before),
+                }
+            } else {
+                courses.clone_from(before);
+            }
         }
-        let courses = courses.clone();
         match found {
             Ok(chosen) => {
                 let Chosen { driver, piece, share, backup_plan, plan } = chosen;
@@ -416,7 +436,7 @@ impl Decision<'_> {
                 *self.piece = piece;
                 let next = self.next();
                 (next.memory, next.share) = (memory, share);
-                (next.lost, next.regained) = (None, SearchProgress::default());
+                (next.lost, next.regained) = (None, regained);
                 if let Some(plan) = plan {
                     next.plan = plan;
                 }
@@ -452,7 +472,7 @@ impl Decision<'_> {
                 })
             }
         };
-        let courses = self.courses.clone();
+        let courses = planning.rests_on(t, &self.now().promises);
         let next = self.next();
         next.regained = regained;
         match found {
@@ -467,7 +487,7 @@ impl Decision<'_> {
             }
             Err(longer) => {
                 // A plan that has expired was kept.
-                let is_at_its_end = next.plan.backup_plan.until <= t + 0.5 * hold;
+                let is_at_its_end = next.plan.backup_plan.until <= t + 0.5 * hold || !next.reaches(t + hold);
                 let PlanState { status, lost, .. } = *self.before();
                 let (status, failure) = match is_regular {
                     _ if lost.is_some() => (status, failure),

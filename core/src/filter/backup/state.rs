@@ -97,6 +97,17 @@ impl PlanState {
         (self.status == AssuranceStatus::Assured).then_some(&self.plan.backup_plan)
     }
 
+    /// Until when in s the plan keeps the promises.
+    pub(super) fn until(&self) -> f64 {
+        let ends = self.courses.iter().flatten().map(|course| course.until);
+        ends.fold(self.plan.backup_plan.until, f64::min)
+    }
+
+    /// Whether the plan accounts for every point until `t`.
+    pub(super) fn reaches(&self, t: f64) -> bool {
+        self.courses.iter().flatten().all(|course| course.until >= t - round_off(t))
+    }
+
     /// How long in s the input of the last sample was to be held, if there was one.
     pub(super) fn last_hold(&self) -> Option<f64> {
         self.sample.map(|[_, hold]| hold)
@@ -209,7 +220,9 @@ impl PlanState {
             if !arrived.is_empty() && arrived.len() != dims[1] || !all_finite(arrived.as_flattened()) {
                 return refuse("arrived", "is not of a plant with as many inputs, or not finite");
             }
-            let is_course = |course: &Course| course.since.is_finite() && all_finite(&course.point);
+            let is_course = |course: &Course| {
+                course.since.is_finite() && all_finite(&course.point) && !course.until.is_nan()
+            };
             if ![0, barriers].contains(&courses.len()) || !courses.iter().flatten().all(is_course) {
                 return refuse("courses", "are not of as many barriers, or not finite");
             }

@@ -55,7 +55,7 @@ const fn plain(
     Row { key: Key::new(name, value, default, meaning), parameters: &[] }
 }
 
-static KEYS: [Row; 33] = [
+static KEYS: [Row; 36] = [
     plain("name", Name, None, "unique; the prefix of its variables"),
     plain(
         "shape",
@@ -240,6 +240,40 @@ static KEYS: [Row; 33] = [
             part("[1]", "velocity of the centre along x", |b| b.shape.point().map(|p| &mut p.velocity[0])),
             part("[2]", "velocity of the centre along y", |b| b.shape.point().map(|p| &mut p.velocity[1])),
         ],
+    },
+    Row {
+        key: Key {
+            name: "acceleration",
+            value: Number(Is("m/s2"), Range::NON_NEGATIVE),
+            default: Some("none: no plan predicts a centre that is an input"),
+            meaning: "by how much the velocity of a centre that is an input may change, in any direction, for ever: then \
+                      [plans account for it](#moving-centres)",
+        },
+        parameters: &[whole("bound on the acceleration of the centre, which plans account for", |b| {
+            b.shape.disc()?.acceleration.as_mut()
+        })],
+    },
+    Row {
+        key: Key {
+            name: "centre_error",
+            value: Number(M, Range::NON_NEGATIVE),
+            default: Some("0"),
+            meaning: "how far the centre may be from that input",
+        },
+        parameters: &[whole("how far the centre may be from its input", |b| {
+            b.shape.disc()?.centre_error.as_mut()
+        })],
+    },
+    Row {
+        key: Key {
+            name: "velocity_error",
+            value: Number(Is("m/s"), Range::NON_NEGATIVE),
+            default: Some("0"),
+            meaning: "how far its velocity may be from that input",
+        },
+        parameters: &[whole("how far the velocity of the centre may be from its input", |b| {
+            b.shape.disc()?.velocity_error.as_mut()
+        })],
     },
     Row {
         key: Key {

@@ -15,6 +15,9 @@ pub(in super::super) struct RawBarrier {
     pub(super) velocity: Option<[f64; 2]>,
     #[serde(default)]
     pub(super) centre_input: bool,
+    pub(super) acceleration: Option<f64>,
+    pub(super) centre_error: Option<f64>,
+    pub(super) velocity_error: Option<f64>,
     pub(super) radius: Option<f64>,
     pub(super) smoothing: Option<f64>,
     pub(super) half_axes: Option<[f64; 2]>,
@@ -59,11 +62,14 @@ pub(in super::super) struct RawBarrier {
 
 impl RawBarrier {
     /// The keys that only some shapes have, and whether they are given; looked at in this order.
-    pub(super) fn of_shape(&self) -> [(&'static str, bool); 15] {
+    pub(super) fn of_shape(&self) -> [(&'static str, bool); 18] {
         [
             ("centre", self.centre.is_some()),
             ("centre_input", self.centre_input),
             ("velocity", self.velocity.is_some()),
+            ("acceleration", self.acceleration.is_some()),
+            ("centre_error", self.centre_error.is_some()),
+            ("velocity_error", self.velocity_error.is_some()),
             ("radius", self.radius.is_some()),
             ("smoothing", self.smoothing.is_some()),
             ("half_axes", self.half_axes.is_some()),

@@ -94,7 +94,20 @@ impl Reader<'_> {
 
     pub(super) fn point(&self) -> Result<Point, ConfigurationError> {
         let velocity = self.raw.velocity.unwrap_or_default();
-        Ok(Point { centre: self.centre()?, velocity, centre_input: self.raw.centre_input })
+        let RawBarrier { centre_input, acceleration, centre_error, velocity_error, .. } = *self.raw;
+        let known = [
+            ("acceleration", acceleration),
+            ("centre_error", centre_error),
+            ("velocity_error", velocity_error),
+        ];
+        if let Some((key, _)) = known.iter().find(|(_, value)| value.is_some() && !centre_input) {
+            return self.refuse(key, "is for a centre that is measured: it needs `centre_input = true`");
+        }
+        if let Some((key, _)) = known.iter().find(|(_, value)| value.is_some() && acceleration.is_none()) {
+            return self.refuse(key, "needs `acceleration` beside it: only plans account for it");
+        }
+        let centre = self.centre()?;
+        Ok(Point { centre, velocity, centre_input, acceleration, centre_error, velocity_error })
     }
 
     pub(super) fn smoothing(&self) -> Automatic {

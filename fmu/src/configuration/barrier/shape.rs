@@ -4,7 +4,7 @@ use punctual_core::Error;
 use punctual_core::barriers::{
     DistanceDisc, Ellipse, HalfPlane, NormBound, Outside, QuadraticDisc, Rectangle, StateBound,
 };
-use punctual_core::filter::FilterBuilder;
+use punctual_core::filter::{FilterBuilder, Motion};
 use punctual_core::plants::Signal;
 use serde::Serialize;
 
@@ -72,7 +72,34 @@ pub struct Point {
     /// Whether both are inputs of the FMU that start with these values, rather than parameters.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub centre_input: bool,
+    /// The bound on its acceleration in m/s², if plans are to predict a centre that is an input.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub acceleration: Option<f64>,
+    /// How far that centre may be from its input, in m, and its velocity, in m/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub centre_error: Option<f64>,
+    /// See [`Self::centre_error`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub velocity_error: Option<f64>,
 }
+
+impl Point {
+    /// A point at rest at `centre` (m).
+    pub const fn at(centre: [f64; 2]) -> Self {
+        Self {
+            centre,
+            velocity: [0.0; 2],
+            centre_input: false,
+            acceleration: None,
+            centre_error: None,
+            velocity_error: None,
+        }
+    }
+}
+
+/// The keys of a centre that may be an input.
+const MOVING: [&str; 6] =
+    ["smoothing", "velocity", "centre_input", "acceleration", "centre_error", "velocity_error"];
 
 /// A row of [`SHAPES`].
 pub struct ShapeRow {
@@ -94,7 +121,7 @@ pub static SHAPES: [ShapeRow; 14] = [
         name: "disc",
         meaning: "inside a disc, distance-shaped: take this one",
         required: &["centre", "radius"],
-        optional: &["smoothing", "velocity", "centre_input"],
+        optional: &MOVING,
         read: |r| {
             Ok(Shape::Disc {
                 at: r.point()?,
@@ -114,7 +141,7 @@ pub static SHAPES: [ShapeRow; 14] = [
         name: "obstacle",
         meaning: "outside of a disc",
         required: &["centre", "radius"],
-        optional: &["smoothing", "velocity", "centre_input"],
+        optional: &MOVING,
         read: |r| {
             Ok(Shape::Obstacle {
                 at: r.point()?,
@@ -298,7 +325,7 @@ impl Shape {
     }
 
     /// The centre that it follows, if that is an input of the FMU.
-    pub(in super::super) fn followed(&self) -> Option<&Point> {
+    pub fn followed(&self) -> Option<&Point> {
         match self {
             Self::Disc { at, .. } | Self::QuadraticDisc { at, .. } | Self::Obstacle { at, .. } => {
                 Some(at).filter(|at| at.centre_input)
@@ -353,6 +380,13 @@ impl Shape {
 }
 
 impl Point {
+    /// How a centre that is an input moves, as plans know it; `None` if that is not declared.
+    pub(in super::super) fn motion(&self) -> Option<Motion> {
+        let [position_error, velocity_error] =
+            [self.centre_error, self.velocity_error].map(Option::unwrap_or_default);
+        self.acceleration.map(|acceleration| Motion { acceleration, position_error, velocity_error })
+    }
+
     /// Whether it stays where it is.
     pub(in super::super) fn is_still(&self) -> bool {
         self.velocity == [0.0; 2] && !self.centre_input
@@ -370,10 +404,13 @@ impl Point {
 /// The numbers that are parameters of the FMU, where a shape has them.
 impl Shape {
     pub(super) fn point(&mut self) -> Option<&mut Point> {
+        self.disc().filter(|at| !at.centre_input)
+    }
+
+    /// The centre of a disc.
+    pub(super) fn disc(&mut self) -> Option<&mut Point> {
         match self {
-            Self::Disc { at, .. } | Self::QuadraticDisc { at, .. } | Self::Obstacle { at, .. } => {
-                Some(at).filter(|at| !at.centre_input)
-            }
+            Self::Disc { at, .. } | Self::QuadraticDisc { at, .. } | Self::Obstacle { at, .. } => Some(at),
             _ => None,
         }
     }
