@@ -451,6 +451,28 @@ fn a_vehicle_that_is_not_its_model_keeps_its_promise() {
     assert!(until[0] < time[time.len() - 1], "{until:?}");
 }
 
+/// A cyclist whose acceleration alone is known: kept clear of, and the promise moves on with the run.
+#[test]
+fn a_measured_cyclist_is_kept_clear_of() {
+    let workshop = Workshop::new();
+    workshop.write("crossing.toml", fs::read(examples().join("crossing.toml")).expect("the example"));
+    let checked = workshop.punctual(["check", "crossing.toml"]).success();
+    for line in [
+        "beside it: acceleration of the centre of cyclist 0.3 m/s2, errors 0.02 m\n",
+        "guaranteed until 3 s, whatever u_ref is\n",
+        "the plan: until 3 s, however the centres move that it covers; ",
+    ] {
+        assert!(checked.contains(line), "{checked}");
+    }
+    workshop.punctual(["run", "crossing.toml", "--require", "guaranteed"]).success();
+    let table = Table::parse(&workshop.text("crossing/crossing.csv"));
+    // Moved in the run, at the velocity with which it starts.
+    let (time, y) = (table.column("time"), table.column("filter.cyclist.centre[2]"));
+    assert!(time.iter().zip(&y).all(|(t, y)| (y - (1.6 * t - 7.0)).abs() < 1e-9), "{y:?}");
+    let until = table.column("filter.assured_until");
+    assert!(time.iter().zip(&until).all(|(time, until)| *until >= time + 1.0), "{until:?}");
+}
+
 /// A set that moves forever has no plan that ends at rest. The message names the key that helps.
 #[test]
 fn a_set_that_moves_asks_for_a_horizon() {

@@ -143,7 +143,9 @@ fn plans_are_followed_where_that_is_possible() {
     );
     let moving = left("").replace("name = \"tree\"", "name = \"tree\"\ncentre_input = true");
     assert!(
-        line(&moving).starts_with("plans: none, since tree follows a centre that is moved from outside, and no plan can"),
+        line(&moving).starts_with(
+            "plans: none, since tree follows a centre that is moved from outside, and no plan can"
+        ),
         "{}",
         line(&moving)
     );

@@ -47,10 +47,13 @@ pub fn alone(configuration: Configuration) -> Result<(String, Vec<Configuration>
         }
     }
     for (name, point) in points {
-        text += &format!("[[component]]\nname = \"{name}_point\"\nfmu = \"{name}_point\"\nstart = {{ \"u.a_x\" = 0.0, \"u.a_y\" = 0.0 }}\n");
+        text += &format!(
+            "[[component]]\nname = \"{name}_point\"\nfmu = \"{name}_point\"\nstart = {{ \"u.a_x\" = 0.0, \"u.a_y\" = 0.0 }}\n"
+        );
         for (state, input) in STATES.iter().zip(INPUTS) {
-            text +=
-                &format!("[[connection]]\nfrom = \"{name}_point.x.{state}\"\nto = \"filter.{name}.{input}\"\n");
+            text += &format!(
+                "[[connection]]\nfrom = \"{name}_point.x.{state}\"\nto = \"filter.{name}.{input}\"\n"
+            );
         }
         configurations.push(point);
     }

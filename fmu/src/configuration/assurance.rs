@@ -236,7 +236,8 @@ impl FilterConfiguration {
             return Some(format!("barrier {} has no model to run ahead", barrier.name));
         }
         let mut found = Vec::new();
-        let unknown = self.barrier.iter().find(|b| b.shape.followed().is_some_and(|at| at.motion().is_none()));
+        let unknown =
+            self.barrier.iter().find(|b| b.shape.followed().is_some_and(|at| at.motion().is_none()));
         if let Some(barrier) = unknown {
             found.push(format!(
                 "{} follows a centre that is moved from outside, and no plan can predict it without its `acceleration`, by how \

@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use punctual_core::filter::Plans;
 use serde::{Deserialize, Serialize};
 
+use super::barrier::BarrierSection;
 use super::key::{
     Key, Section,
     Unit::{Is, Of},
     Value::{Number, NumberByName, Pair, TableByName},
 };
-use super::barrier::BarrierSection;
 use super::names::check_known;
 use super::{ConfigurationError, FilterConfiguration, Parameter, PlantSection, Range, over_seconds};
 use crate::text::{number, quantity};
@@ -265,7 +265,8 @@ impl FilterConfiguration {
             let errors = [(motion.position_error, "m"), (motion.velocity_error, "m/s")];
             let errors = errors.into_iter().filter(|(error, _)| *error > 0.0);
             let errors: Vec<_> = errors.map(|(error, unit)| quantity(error, unit)).collect();
-            let errors = if errors.is_empty() { String::new() } else { format!(", errors {}", errors.join(", ")) };
+            let errors =
+                if errors.is_empty() { String::new() } else { format!(", errors {}", errors.join(", ")) };
             let acceleration = quantity(motion.acceleration, "m/s2");
             Some(format!("acceleration of the centre of {} {acceleration}{errors}", barrier.name))
         };
