@@ -14,7 +14,9 @@ use crate::convergence::FixedTimeState;
 use crate::filter::integrator::Integrator;
 use crate::filter::rows::{BarrierSlot, End, Rows, Workspace};
 use crate::filter::{Infeasible, Phase, Status};
-use crate::plan::{Course, Failure, Plan, Planner, SearchProgress, TOLERANCES, Uncertainty, slopes};
+use crate::plan::{
+    BackupPlan, Course, Failure, Plan, Planner, SearchProgress, TOLERANCES, Uncertainty, slopes,
+};
 use crate::qp::Bounds;
 use crate::scalar::all_finite;
 
@@ -434,6 +436,11 @@ impl Decision<'_> {
                 u.copy_from_slice(&backup_plan.inputs[0].1[..u.len()]);
                 self.assurance.reason = memory.reason.filter(|_| *u != wanted[..u.len()]);
                 *self.piece = piece;
+                // A law that goes on rests on what was measured when it was checked.
+                let law = |plan: &BackupPlan| plan.tracking().map(core::ptr::from_ref);
+                let goes_on =
+                    law(&backup_plan).is_some() && law(&backup_plan) == law(&self.before().plan.backup_plan);
+                let courses = if goes_on { self.before().courses.clone() } else { courses };
                 let next = self.next();
                 (next.memory, next.share) = (memory, share);
                 (next.lost, next.regained) = (None, regained);
@@ -527,7 +534,7 @@ impl Decision<'_> {
         let inputs = &plan.backup_plan.inputs;
         let next = inputs.iter().find(|(end, _)| *end > t + 0.5 * hold);
         // Past its end, the plant leaves an equilibrium that only feedback holds.
-        let is_over = next.is_none() && !plan.stays();
+        let is_over = next.is_none() && !plan.stays() || !self.now().reaches(t + hold);
         if let Some((_, input)) = next.or(inputs.last()) {
             for (i, u) in u.iter_mut().enumerate() {
                 *u = self.bounds.clamp(i, input[i]);
