@@ -33,6 +33,7 @@ use super::backup_plan::{BackupPlan, Tightest};
 use super::expansion::{self, at, shifted};
 use super::law::Reference;
 use super::model::Model;
+use super::tube::faults::{Fault, is_planted};
 use super::tube::{Piece, Tube};
 use super::{Failure, Integral, Requirement};
 use crate::MAX_INPUTS;
@@ -149,6 +150,12 @@ impl<'a> Walk<'a> {
     /// A requirement in force that such a plant does not meet here.
     pub(super) fn within(mut self, tube: Tube<'a>) -> Result<Self, Failure> {
         self.tube = Some(Box::new(tube));
+        self.meet_in_tube()?;
+        Ok(self)
+    }
+
+    /// Checks every requirement in force for the plants that are in the tube here.
+    fn meet_in_tube(&mut self) -> Result<(), Failure> {
         for i in 0..self.requirements.len() {
             if self.requirements[i].is_in_force(self.t) {
                 let (t, x) = (self.t, core::mem::take(&mut self.x));
@@ -159,7 +166,7 @@ impl<'a> Walk<'a> {
                 self.note_in_tube(i, t, h - fall, fall)?;
             }
         }
-        Ok(self)
+        Ok(())
     }
 
     /// The tube around the rollout.
@@ -183,6 +190,9 @@ impl<'a> Walk<'a> {
     ///
     /// What is not met.
     pub(super) fn hold_in_tube(&mut self, u: &[f64], gain: Option<&[f64]>, end: f64) -> Result<(), Failure> {
+        if is_planted(Fault::Samples) {
+            self.meet_in_tube()?;
+        }
         if let Some(tube) = &mut self.tube {
             tube.hold(u, &self.x, gain)?;
         }
@@ -208,6 +218,9 @@ impl<'a> Walk<'a> {
         let Some(tube) = &mut self.tube else {
             return [self.least(i, (path, over), (from, dt), self.tolerances.halvings), 0.0];
         };
+        if is_planted(Fault::Samples) {
+            return [f64::INFINITY, 0.0];
+        }
         let (requirement, time) = (&self.requirements[i], Interval::new(from, from + dt));
         let boxed = requirement.model.value_over(time, &tube.around_piece(over));
         let lowest = boxed.map_or(f64::NEG_INFINITY, |h| h.low);

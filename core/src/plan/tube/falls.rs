@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::Tube;
 use super::bends::{radius, size};
+use super::faults;
 use super::zonotope::{self, Zonotope};
 use crate::interval::Interval;
 use crate::lie::{ExpansionOver, Second};
@@ -49,7 +50,10 @@ impl Tube<'_> {
         // Any deviation is near a line between one at the beginning and one at the end.
         let mut ends = |along: &[f64], of: &dyn Fn(f64, f64) -> f64| {
             let mut end = |set: &Zonotope| {
-                of(zonotope::dot(along, &set.centre), set.half_width(along, &mut rooms.parts))
+                of(
+                    zonotope::dot(along, &set.centre),
+                    faults::part() * set.half_width(along, &mut rooms.parts),
+                )
             };
             end(before).max(end(set))
         };

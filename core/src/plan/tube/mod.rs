@@ -31,6 +31,7 @@
 //! | here | the tube, moved on by a piece |
 //! | `bends` | on what a function depends, and where it is curved |
 //! | `falls` | by how much h may be lower in the tube than along the reference |
+//! | `faults` | defects that tests plant |
 //! | `tracking` | the law: reference, gains and radii, by sample |
 //! | `zonotope` | sets |
 //!
@@ -39,6 +40,7 @@
 
 mod bends;
 mod falls;
+pub(super) mod faults;
 mod tracking;
 mod zonotope;
 
@@ -57,6 +59,7 @@ use crate::lie::{Expansion, ExpansionOver, Predict, Second};
 use crate::qp::Bounds;
 use crate::scalar::{Scalar, all_finite};
 use bends::{Bends, radius, size};
+use faults::{Fault, is_planted};
 pub use tracking::Tracking;
 pub(super) use tracking::gains;
 use zonotope::Zonotope;
@@ -273,11 +276,19 @@ impl<'a> Tube<'a> {
             barriers: requirements.iter().map(value).collect(),
             rooms: Rooms::default(),
         };
-        for (i, error) in of.errors.iter().enumerate() {
+        tube.next_unseen = tube.errors();
+        for (i, error) in tube.next_unseen.iter().enumerate() {
             tube.set.push_along(i, *error);
         }
         tube.set.reach(&mut tube.reach);
         Some(tube)
+    }
+
+    /// How far each state may be from its measured value.
+    fn errors(&self) -> Vec<f64> {
+        let mut errors = self.of.errors.clone();
+        errors.iter_mut().take(usize::from(is_planted(Fault::Error))).for_each(|error| *error = 0.0);
+        errors
     }
 
     /// The same tube if each input that arrives is within `acting` when it begins.
@@ -312,7 +323,7 @@ impl<'a> Tube<'a> {
     pub(super) fn hold(&mut self, v: &[f64], z: &[f64], gain: Option<&[f64]>) -> Result<(), Failure> {
         let ([n, m], kept) = (self.dims, self.dims[0] + self.late);
         self.unseen.copy_from_slice(&self.next_unseen);
-        self.next_unseen.copy_from_slice(&self.of.errors);
+        self.next_unseen = self.errors();
         self.set.reach(&mut self.reach);
         let sizes: Vec<f64> = self.reach[..kept].iter().map(|reach| reach.max(LEAST)).collect();
         // What arrives does not jump, what is asked does, and a share of the law follows from the states. So a box around some
@@ -372,7 +383,8 @@ impl<'a> Tube<'a> {
             }
         } else {
             for j in 0..n {
-                let asked = (0..m).map(|i| gain[i * n + j] * self.unseen[j]);
+                let unseen = if is_planted(Fault::Noise) { 0.0 } else { self.unseen[j] };
+                let asked = (0..m).map(|i| gain[i * n + j] * unseen);
                 self.set.push((0..n).map(|_| 0.0).chain(asked));
             }
         }
@@ -384,7 +396,7 @@ impl<'a> Tube<'a> {
     fn is_bounded(&mut self, v: &[f64], others: &[f64]) -> Result<(), Failure> {
         let kept = self.dims[0] + self.late;
         for (i, (v, other)) in v.iter().zip(others).enumerate() {
-            let share = (self.reach[kept + i] + other) * (1.0 + ROUND_OFF);
+            let share = (self.reach[kept + i] + other) * (1.0 + ROUND_OFF) * faults::part();
             self.lacks.feedback[i] = self.lacks.feedback[i].max(share);
             let over = (v + share - self.bounds.max[i]).max(self.bounds.min[i] - v + share);
             // NaN is not within bounds.
@@ -466,7 +478,10 @@ impl<'a> Tube<'a> {
         // and by at most `spread`; of its late deviation at most `changes` is not in the mean. Altogether by at most `most`.
         let arrives = |i: usize, differs: f64| {
             let [least, largest] = of.gains[i];
-            let (part, half) = (0.5 * (least + largest), 0.5 * (largest - least) * (1.0 + 1e-15));
+            let (part, mut half) = (0.5 * (least + largest), 0.5 * (largest - least) * (1.0 + 1e-15));
+            if is_planted(Fault::Gain) && i == 0 {
+                half = 0.0;
+            }
             let (mean, around) = middle(of.remains_on_average(i, dt, held));
             let (late, apart) = (lates[i], noise[i] + differs);
             let (asked, fixed) = (reach[kept + i] + apart, (part - 1.0) * u[i]);
@@ -540,6 +555,9 @@ impl<'a> Tube<'a> {
                 );
             }
             plant.curvatures(here, (variables, rates), evaluate, curvatures);
+            if is_planted(Fault::Remainder) {
+                curvatures.fill(Interval::from(0.0));
+            }
             for i in n..n + m {
                 here[i] = Interval::from(u[i - n]);
             }

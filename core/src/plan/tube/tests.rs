@@ -1,5 +1,7 @@
 //! Sets that enclose, and tubes that no plant within what was declared leaves.
 
+mod tight;
+
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec;
