@@ -8,7 +8,7 @@
 
 mod uncertain;
 
-use punctual_core::barriers::DistanceDisc;
+use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::*;
 use punctual_core::plants::{Bicycle, PointMass, Unicycle};
@@ -280,6 +280,161 @@ fn samples_at_other_times_have_a_plan_of_their_own() {
             }
         }
         assert!(assured > 100, "{k}: {assured}");
+    }
+}
+
+/// Samples of a filter for a point mass that goes to a disc 12 m away, before one that follows its inputs as late as declared.
+/// `before` sees the number of a sample, the filter, the measurement and u_ref. Returns whether each sample was assured.
+fn followed_late(
+    filter: &mut Filter,
+    declared: &Declared,
+    samples: u32,
+    mut before: impl FnMut(u32, &mut Filter, &mut [f64; 4], &mut [f64; 2]),
+) -> Vec<bool> {
+    let (mut x, mut late, mut acting, mut u) = ([0.0_f64; 4], [0.0; 2], [0.0; 2], [0.0; 2]);
+    let assured = |step: u32| {
+        let (mut seen, mut u_ref) = (x, [4.0, 0.0]);
+        before(step, filter, &mut seen, &mut u_ref);
+        let report = filter.step(f64::from(step) * PERIOD, &seen, &u_ref, &mut u).unwrap();
+        let assured = report.assurance.unwrap().is_assured();
+        let asked = if declared.delay > 0.0 { core::mem::replace(&mut acting, u) } else { u };
+        for i in 0..2 {
+            let left = (-PERIOD / declared.lags[i][1].max(1e-9)).exp();
+            // The mean over the hold; the way that it adds is less than is declared.
+            let lag = declared.lags[i][1] / PERIOD * (1.0 - left);
+            let mean = asked[i] + (late[i] - asked[i]) * lag;
+            late[i] = asked[i] + (late[i] - asked[i]) * left;
+            x[i] += PERIOD * x[i + 2] + 0.5 * PERIOD * PERIOD * mean;
+            x[i + 2] += PERIOD * mean;
+        }
+        assured
+    };
+    (0..samples).map(assured).collect()
+}
+
+fn to_a_disc(declared: &Declared, arm_after: f64) -> Filter {
+    let goal = DistanceDisc::new([12.0, 0.0], RADIUS, 1.0).unwrap();
+    let builder =
+        Filter::builder(PointMass).barrier("goal", goal, BarrierSettings::within(DEADLINE)).unwrap();
+    let builder = builder.bounds(&[-4.0; 2], &[4.0; 2]).unwrap().sampling(Sampling::Period(PERIOD)).unwrap();
+    let builder = builder.actuation_delay(declared.delay).unwrap().arm_after(arm_after).unwrap();
+    let plans = Plans::every(PERIOD).uncertain_lags(&declared.lags).measurement_errors(&declared.errors);
+    builder.build().unwrap().with_plans(plans).unwrap()
+}
+
+/// What was asked before a filter is armed, or armed again, still arrives where inputs are followed late, and acts where they
+/// are delayed: a plan begins with it, and the plant is where the plan says.
+#[test]
+fn what_was_asked_before_still_arrives() {
+    let late = Declared { lags: [[0.08, 0.1]; 2], errors: [2e-3; 4], ..Declared::nothing() };
+    let delayed = Declared { delay: PERIOD, errors: [2e-3; 4], ..Declared::nothing() };
+    let again = followed_late(&mut to_a_disc(&late, 0.0), &late, 60, |step, filter, _, _| {
+        if step == 25 {
+            filter.rearm();
+        }
+    });
+    assert!(again.iter().all(|assured| *assured), "{again:?}");
+    // u_ref passes until the filter is armed; the last of it is 0, and what it was before still arrives.
+    let later = followed_late(&mut to_a_disc(&late, 25.0 * PERIOD), &late, 60, |step, _, _, u_ref| {
+        if step == 24 {
+            *u_ref = [0.0; 2];
+        }
+    });
+    assert!(later[25..].iter().all(|assured| *assured), "{later:?}");
+    // Where nothing is measured, 0 is given, armed or not.
+    let unseen = followed_late(&mut to_a_disc(&delayed, 25.0 * PERIOD), &delayed, 60, |step, _, seen, _| {
+        if step == 24 {
+            seen[0] = f64::NAN;
+        }
+    });
+    assert!(unseen[25..].iter().all(|assured| *assured), "{unseen:?}");
+}
+
+/// Where samples may come late or soon, none says when the next one comes: not a burst of early ones, nor one that is late.
+#[test]
+fn a_declared_jitter_is_no_other_clock() {
+    let declared = Declared { jitter: 0.3, ..Declared::all(true) };
+    let case = Case { x: [0.0; 4], goal: [12.0, 0.0], rocks: Vec::new(), bounds: [4.0; 2], is_point: true };
+    let (mut filter, mut x, mut u) = (case.filter(PointMass, Some(&declared)), case.x, [0.0; 2]);
+    let burst = [0.5; 12].into_iter().chain([1.3, 1.29, 1.0, 1.3, 1.28, 0.1, 1.3]);
+    let (mut t, mut last) = (0.0, 0.0);
+    for part in burst.cycle().take(200) {
+        last = t;
+        let hold = filter.usual_hold(t).expect("plans");
+        assert_eq!(hold, PERIOD, "{t}");
+        // As a caller does that is told nothing of the next sample.
+        filter.expect_hold(Some(hold)).unwrap();
+        let report = filter.step(t, &x, &[4.0, 0.0], &mut u).unwrap();
+        assert!(report.assurance.unwrap().is_assured(), "{t}: {:?}", report.assurance);
+        let h = part * PERIOD;
+        x = core::array::from_fn(|i| match i {
+            0 | 1 => x[i] + h * x[i + 2] + 0.5 * h * h * u[i],
+            _ => x[i] + h * u[i - 2],
+        });
+        t += h;
+    }
+    // A clock that is slower than declared is another one.
+    let slower = filter.usual_hold(last + 2.0 * PERIOD).expect("plans");
+    assert!((slower - 2.0 * PERIOD).abs() < 1e-9 * PERIOD, "{slower}");
+}
+
+/// Any number of periods that a sample may be late is answered: by a refusal, where no law is that patient.
+#[test]
+fn a_huge_jitter_is_answered() {
+    let case = Case { x: [0.0; 4], goal: [12.0, 0.0], rocks: Vec::new(), bounds: [4.0; 2], is_point: true };
+    for jitter in [1e3, 1e18, 1e30, f64::MAX] {
+        let declared = Declared { jitter, ..Declared::all(true) };
+        let (mut filter, mut u) = (case.filter(PointMass, Some(&declared)), [0.0; 2]);
+        let report = filter.step(0.0, &case.x, &[4.0, 0.0], &mut u).unwrap();
+        assert!(!report.assurance.unwrap().is_assured(), "{jitter}");
+    }
+}
+
+/// A promise that is regained holds from the sample on, and not only from where its input begins to act: not while the plant is
+/// on its way through a rock.
+#[test]
+fn a_promise_is_regained_from_the_sample_on() {
+    const HOLD: f64 = 0.2;
+    const SPEED: f64 = 4.0;
+    const ROCK: ([f64; 2], f64) = ([10.4, 0.0], 0.15);
+    for is_exact in [false, true] {
+        let goal = DistanceDisc::new([20.0, 0.0], RADIUS, 1.0).unwrap();
+        let rock = Outside(DistanceDisc::new(ROCK.0, ROCK.1, 1.0).unwrap());
+        let builder = Filter::builder(PointMass)
+            .barrier("goal", goal, BarrierSettings::within(DEADLINE))
+            .unwrap()
+            .barrier("rock", rock, BarrierSettings::keeping())
+            .unwrap();
+        let builder =
+            builder.bounds(&[-4.0; 2], &[4.0; 2]).unwrap().sampling(Sampling::Period(HOLD)).unwrap();
+        let plans = Plans::every(HOLD).measurement_errors(&[if is_exact { 0.0 } else { 1e-3 }; 4]);
+        let filter = builder.actuation_delay(HOLD).unwrap().build().unwrap();
+        let (mut filter, mut x, mut acting, mut u) =
+            (filter.with_plans(plans).unwrap(), [0.0, 0.0, 2.0, 0.0], [0.0; 2], [0.0; 2]);
+        let mut last = Vec::new();
+        for step in 0..8_u32 {
+            // Displaced to a hold before the rock: one sample loses the promise, the next might regain it.
+            if step == 6 {
+                x = [ROCK.0[0] - 0.5 * SPEED * HOLD - SPEED * HOLD, 0.0, SPEED, 0.0];
+                acting = [0.0; 2];
+            }
+            let report = filter.step(f64::from(step) * HOLD, &x, &[0.0; 2], &mut u).unwrap();
+            last = report.barriers.iter().map(|b| b.guaranteed).collect();
+            if step < 7 {
+                for i in 0..2 {
+                    x[i] += HOLD * x[i + 2] + 0.5 * HOLD * HOLD * acting[i];
+                    x[i + 2] += HOLD * acting[i];
+                }
+                acting = u;
+            }
+        }
+        // Until its input acts, the last one of them leads into the rock, whatever comes next.
+        let passes = (0..=100_u32).any(|k| {
+            let t = HOLD * f64::from(k) / 100.0;
+            let at: [f64; 2] = core::array::from_fn(|i| x[i] + t * x[i + 2] + 0.5 * t * t * acting[i]);
+            (at[0] - ROCK.0[0]).hypot(at[1] - ROCK.0[1]) < ROCK.1
+        });
+        assert!(passes && last == [false, false], "{is_exact}: {passes} {last:?} {x:?}");
     }
 }
 

@@ -362,8 +362,12 @@ impl Filter {
         let state = &mut self.rows.state;
         state.barriers.fill(FixedTimeState::default());
         (state.time, state.period, state.curvatures) = (None, None, [None; 2]);
-        // Behind a delay it still acts.
-        if self.rows.delay == 0.0 {
+        // Behind a delay it still acts, and what follows late still arrives.
+        #[cfg(feature = "plan")]
+        let is_late = self.backup.as_ref().is_some_and(|backup| backup.lags());
+        #[cfg(not(feature = "plan"))]
+        let is_late = false;
+        if self.rows.delay == 0.0 && !is_late {
             state.input.fill(0.0);
         }
         #[cfg(feature = "plan")]

@@ -481,10 +481,11 @@ impl Filter {
 
     /// How long in s the input at `t` is held if samples continue as before: as long as the previous one, and with an
     /// inexact clock slightly longer than any so far. A sample in between changes nothing until eight in a row came as soon.
-    /// The period at first, and after [`Self::rearm`] if the sample comes at another time than expected. `None` without
-    /// plans.
+    /// The period at first, after [`Self::rearm`] if the sample comes at another time than expected, and as long as samples come
+    /// within a declared [jitter](Plans::jitter). `None` without plans.
     pub fn usual_hold(&self, t: f64) -> Option<f64> {
-        Some(self.rows.state.plan.usual_hold(t + self.rows.delay, self.backup.as_ref()?.period()))
+        let Plans { period, jitter, .. } = self.backup.as_ref()?.plans;
+        Some(self.rows.state.plan.usual_hold(t + self.rows.delay, (period, jitter)))
     }
 
     /// How long in s the last input was to be held, as far as known; without plans, the measured sampling period.
@@ -537,6 +538,11 @@ impl Backup {
 
     pub(super) fn period(&self) -> f64 {
         self.plans.period
+    }
+
+    /// Whether an input is followed late.
+    pub(super) fn lags(&self) -> bool {
+        self.uncertainty.as_ref().is_some_and(Uncertainty::lags)
     }
 
     fn planning<'a>(&'a self, (rows, integrator): (&'a Rows, Option<&'a Integrator>)) -> Planning<'a> {

@@ -148,6 +148,7 @@ impl<'a> Planning<'a> {
         let (PlanState { arrived, sample, .. }, asked) = (self.before(), self.rows.acting());
         // What arrived is known from sample to sample, and before the first input. Otherwise it is within its bounds.
         let is_first = self.rows.state.time.is_none()
+            && self.rows.state.start.is_none()
             && asked == core::array::from_fn(|i| self.rows.bounds.clamp(i, 0.0));
         let since = match sample {
             Some([last, _]) if !arrived.is_empty() => Some((t - last).max(0.0)),

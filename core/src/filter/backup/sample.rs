@@ -123,6 +123,13 @@ impl Decision<'_> {
         {
             self.end(AssuranceStatus::Lost, Some(failure));
         }
+        // The plan before kept the promise until its input acts.
+        if self.now().status == AssuranceStatus::Assured
+            && !matches!(self.before().status, AssuranceStatus::Assured | AssuranceStatus::Undecided)
+            && let Err(failure) = self.planning().waits(&self.now().promises, self.measured, t)
+        {
+            self.end(AssuranceStatus::Lost, Some(failure));
+        }
         if let Some(failure) = undeclared
             && self.now().status == AssuranceStatus::Assured
         {

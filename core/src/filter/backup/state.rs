@@ -118,11 +118,15 @@ impl PlanState {
         self.sample.map(|[t, _]| t)
     }
 
-    /// As [`Filter::usual_hold`](crate::filter::Filter::usual_hold), for plans of this `period`.
-    pub(super) fn usual_hold(&self, t: f64, period: f64) -> f64 {
+    /// As [`Filter::usual_hold`](crate::filter::Filter::usual_hold), for plans of this `period` and with this declared `jitter`.
+    pub(super) fn usual_hold(&self, t: f64, (period, jitter): (f64, f64)) -> f64 {
         let PlanState { status, sample, alike, interval, .. } = *self;
         let Some([last, held]) = sample else { return period };
         let passed = t - last;
+        // Where samples are declared to come so late or soon, one says nothing of the next.
+        if jitter > 0.0 && passed <= (1.0 + jitter) * period + round_off(t) {
+            return period;
+        }
         let is_same = (passed - held).abs() <= TOLERANCES.on_time * held + round_off(t);
         let is_usual =
             passed < DECISIONS.quicker * held && alike + 1 >= DECISIONS.alike && is_like(passed, interval);

@@ -365,10 +365,7 @@ impl Rows {
         }
         for (i, ui) in u.iter_mut().enumerate() {
             *ui = self.bounds.clamp(i, 0.0);
-            // Before the first sample it is known without.
-            if self.state.time.is_some() {
-                next.input[i] = *ui;
-            }
+            next.input[i] = *ui;
         }
     }
 

@@ -210,7 +210,7 @@ impl<'a> Planner<'a> {
         let (mut least, mut failure) = (None, Failure::Spreads);
         // Where samples may come late, each hold has one.
         let (jitter, whole) = (uncertain.of.jitter, uncertain.of.jitter as usize);
-        let quickest = 1 + whole + usize::from(jitter > whole as f64);
+        let quickest = whole.saturating_add(1 + usize::from(jitter > whole as f64)).min(samples);
         for longest in longest {
             // What the quickest law lacks counts.
             least = None;
