@@ -475,6 +475,82 @@ fn a_tube_that_is_too_small_by_a_fiftieth_is_found() {
     }
 }
 
+/// How far the tube of a plant reaches in each state, either side of its reference, after so many holds of `h` s without
+/// feedback.
+fn open_loop<P>(
+    plant: P,
+    of: &Uncertainty,
+    (x, v): ([f64; 4], [f64; 2]),
+    holds: u32,
+    h: f64,
+    fault: Option<Fault>,
+) -> [[f64; 2]; 4]
+where
+    P: ControlAffine<4, 2> + Send + Sync + 'static,
+{
+    let own = source(plant);
+    let model = own.predict().expect("a model");
+    let bounds = Bounds { min: [-9.0; MAX_INPUTS], max: [9.0; MAX_INPUTS] };
+    faults::with(fault, || {
+        let mut tube = Tube::around(model, (of, [0.0, h]), &bounds, [4, 2], &[]).expect("derivatives");
+        let (mut z, mut path) = (x, vec![[0.0; EXPANSION_ORDERS]; 4]);
+        for _ in 0..holds {
+            tube.hold(&v, &z, None).expect("within bounds");
+            model.path(&z, &v, &mut path);
+            let over: Vec<_> = path.iter().map(|c| expansion::over(c, h)).collect();
+            tube.advance(model, Piece { path: &path, over: &over, dt: h, u: &v }, |_| 0.0).expect("a bound");
+            z = core::array::from_fn(|i| expansion::at(&path[i], h));
+        }
+        core::array::from_fn(|i| {
+            let mut direction = [0.0; 4];
+            direction[i] = 1.0;
+            let half = tube.set.half_width(&direction, &mut Vec::new());
+            [tube.set.centre[i] - half, tube.set.centre[i] + half]
+        })
+    })
+}
+
+/// Nothing is uncertain of a plant with four states and two inputs.
+fn exact() -> Uncertainty {
+    let (rates, errors) = (vec![0.0; 4], vec![0.0; 4]);
+    Uncertainty { rates, errors, gains: vec![[1.0; 2]; 2], lags: vec![[0.0; 2]; 2], jitter: 0.0 }
+}
+
+/// Part of a known deviation that counts as round-off.
+const ROUNDED: f64 = 1e-9;
+
+/// A point mass that receives more of its input than it is asked for is where a tube that ignores this is not.
+#[test]
+fn a_gain_that_is_ignored_is_found() {
+    const ASKED: f64 = 2.0;
+    let of = Uncertainty { gains: vec![[0.9, 1.1], [1.0, 1.0]], ..exact() };
+    let reach = |fault| open_loop(PointMass, &of, ([0.0; 4], [ASKED, 0.0]), 20, 0.05, fault);
+    for part in of.gains[0] {
+        // After a second.
+        let ahead = [0.5 * (part - 1.0) * ASKED, 0.0, (part - 1.0) * ASKED, 0.0];
+        let is_in = |reach: [[f64; 2]; 4], i: usize| {
+            let most = ahead[i].abs() * ROUNDED;
+            (reach[i][0] - most..=reach[i][1] + most).contains(&ahead[i])
+        };
+        assert!((0..4).all(|i| is_in(reach(None), i)), "{ahead:?} {:?}", reach(None));
+        assert!(!is_in(reach(Some(Fault::Gain)), 0) && !is_in(reach(Some(Fault::Gain)), 2));
+    }
+}
+
+/// A unicycle with another heading is behind its reference, by v t (1 − cos e): what first derivatives do not see.
+#[test]
+fn what_first_derivatives_leave_out_is_found() {
+    const SPEED: f64 = 2.0;
+    const ERROR: f64 = 0.2;
+    let of = Uncertainty { errors: vec![0.0, 0.0, ERROR, 0.0], ..exact() };
+    let reach = |fault| open_loop(Unicycle, &of, ([0.0, 0.0, 0.0, SPEED], [0.0; 2]), 20, 0.05, fault);
+    // After a second.
+    let behind = SPEED * (ERROR.cos() - 1.0);
+    let ([low, high], [faulty, _]) = (reach(None)[0], reach(Some(Fault::Remainder))[0]);
+    assert!(low <= behind && high >= 0.0, "{low} {high}");
+    assert!(behind < faulty, "{behind} {faulty}");
+}
+
 /// A rock that lies between two samples is hit between them: a check at samples alone does not see it, and the run does.
 #[test]
 fn a_check_at_samples_alone_is_found() {
