@@ -159,7 +159,7 @@ impl<P: ControlAffine<4, 2>> Followed<'_, P> {
     }
 
     /// How far in `direction` the worst run that is found is from the reference after `holds`.
-    fn worst(&self, holds: usize, direction: [f64; 4], draws: &mut Draws, tries: u32) -> f64 {
+    fn worst(&self, holds: usize, direction: [f64; 4], draws: &mut Draws, tries: u32) -> (f64, Vec<Signs>) {
         let reached = |passed: &Passed| {
             let (x, z) = (passed.states[holds * SLICES], &self.law.states[holds]);
             (0..4).map(|i| direction[i] * (x[i] - z[i])).sum::<f64>()
@@ -188,7 +188,7 @@ impl<P: ControlAffine<4, 2>> Followed<'_, P> {
                 farthest = (reached(&passed), signs);
             }
         }
-        farthest.0
+        farthest
     }
 }
 
@@ -204,6 +204,28 @@ fn reaches<P>(
 where
     P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
 {
+    let mut found = vec![0.0; asked.len()];
+    let feedback = faults::with(fault, || {
+        along(plant, declared, law, |k, set| {
+            for (found, (_, direction)) in found.iter_mut().zip(asked).filter(|(_, (holds, _))| *holds == k) {
+                *found = zonotope::dot(direction, &set.centre)
+                    + faults::part() * set.half_width(direction, &mut Vec::new());
+            }
+        })
+    });
+    (found, feedback)
+}
+
+/// Looks at the tube along `law` before each of its holds. Returns the largest share of each input.
+fn along<P>(
+    plant: &P,
+    declared: &Declared,
+    law: &Tracking,
+    mut look: impl FnMut(usize, &zonotope::Zonotope),
+) -> [f64; 2]
+where
+    P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
+{
     let own = source(plant.clone());
     let model = own.predict().expect("a model");
     let bounds = Bounds { min: [-1e9; MAX_INPUTS], max: [1e9; MAX_INPUTS] };
@@ -214,33 +236,26 @@ where
         lags: declared.lags.to_vec(),
         jitter: 0.0,
     };
-    faults::with(fault, || {
-        let tube = Tube::around(model, (&of, [0.0, PERIOD]), &bounds, [4, 2], &[]).expect("derivatives");
-        let plant = Model {
-            plant: model,
-            dims: [4, 2],
-            bounds: &bounds,
-            integral: None,
-            settings: &SETTINGS,
-            step: PERIOD,
-        };
-        let grid = Grid { period: PERIOD, even: true };
-        let mut walk = Walk::new(plant, &TOLERANCES, &[], 1.0, grid, (law.times[0], &law.states[0]))
-            .and_then(|walk| walk.within(tube))
-            .expect("no requirement");
-        let mut found = vec![0.0; asked.len()];
-        for k in 0..law.inputs.len() {
-            let gain = Some(&law.gains[k][..]).filter(|gain| !gain.is_empty());
-            for (found, (_, direction)) in found.iter_mut().zip(asked).filter(|(_, (holds, _))| *holds == k) {
-                let set = &walk.tube().expect("a tube").set;
-                *found = zonotope::dot(direction, &set.centre)
-                    + faults::part() * set.half_width(direction, &mut Vec::new());
-            }
-            walk.hold_in_tube(&law.inputs[k], gain, law.times[k + 1]).expect("within bounds");
-        }
-        let feedback = walk.tube().expect("a tube").lacks.feedback;
-        (found, [feedback[0], feedback[1]])
-    })
+    let tube = Tube::around(model, (&of, [0.0, PERIOD]), &bounds, [4, 2], &[]).expect("derivatives");
+    let plant = Model {
+        plant: model,
+        dims: [4, 2],
+        bounds: &bounds,
+        integral: None,
+        settings: &SETTINGS,
+        step: PERIOD,
+    };
+    let grid = Grid { period: PERIOD, even: true };
+    let mut walk = Walk::new(plant, &TOLERANCES, &[], 1.0, grid, (law.times[0], &law.states[0]))
+        .and_then(|walk| walk.within(tube))
+        .expect("no requirement");
+    for k in 0..law.inputs.len() {
+        look(k, &walk.tube().expect("a tube").set);
+        let gain = Some(&law.gains[k][..]).filter(|gain| !gain.is_empty());
+        walk.hold_in_tube(&law.inputs[k], gain, law.times[k + 1]).expect("within bounds");
+    }
+    let feedback = walk.tube().expect("a tube").lacks.feedback;
+    [feedback[0], feedback[1]]
 }
 
 /// Ratios of the tube to the worst run that is found, and in how many cases each defect is found.
@@ -280,7 +295,7 @@ where
         let asked: Vec<(usize, [f64; 4])> =
             places.iter().flat_map(|k| directions().map(|direction| (*k, direction))).collect();
         let followed = Followed { plant, declared: &declared, law };
-        let mut worst = |holds: usize, direction| followed.worst(holds, direction, &mut draws, tries);
+        let mut worst = |holds: usize, direction| followed.worst(holds, direction, &mut draws, tries).0;
         // The law's share of an input, of which the last error of measurement has a part.
         let mut shares = [0.0_f64; 2];
         for k in places.iter().copied().filter(|k| *k > 0) {
@@ -635,4 +650,54 @@ fn table_of_defects_end_to_end() {
             assert_eq!((broken, withdrawn), (0, 0));
         }
     }
+}
+
+/// Writes ten plans, their tubes and runs that are among the worst to the file that `PUNCTUAL_PLANS` names, for
+/// `tests/falsify/referee.py`.
+#[test]
+fn plans_for_a_referee() {
+    let Some(file) = std::env::var_os("PUNCTUAL_PLANS") else { return };
+    let mut plans = exported(&PointMass, "point mass", [4.0, 4.0], 2);
+    plans.extend(exported(&Unicycle, "unicycle", [4.0, 1.5], 4));
+    plans.extend(exported(&Bicycle::new(2.5).expect("a length"), "bicycle", [4.0, 0.6], 4));
+    std::fs::write(file, serde_json::to_string(&plans).expect("JSON")).expect("a file to write");
+}
+
+fn exported<P>(plant: &P, name: &str, bounds: [f64; 2], count: usize) -> Vec<serde_json::Value>
+where
+    P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
+{
+    let is_point = name == "point mass";
+    let (mut draws, declared, mut plans) = (Draws(41), Declared::all(is_point), Vec::new());
+    while plans.len() < count {
+        let case = Case::draw(&mut draws, bounds, is_point);
+        let filter = case.filter(plant.clone(), Some(&declared));
+        let Ok(plan) = filter.planning().expect("plans").plan_from(0.0, &case.x, 1.0) else { continue };
+        let law = plan.tracking().expect("a law");
+        let mut reach: Vec<Vec<f64>> = Vec::new();
+        along(plant, &declared, law, |_, set| {
+            let mut sizes = vec![0.0; set.centre.len()];
+            set.reach(&mut sizes);
+            reach.push(sizes[..4].to_vec());
+        });
+        let (followed, holds) = (Followed { plant, declared: &declared, law }, law.inputs.len() - 1);
+        let run = |direction: [f64; 4], draws: &mut Draws| {
+            let passed = followed.run(&followed.worst(holds, direction, draws, 0).1);
+            let at = |k: usize| -> Vec<f64> {
+                (0..4).map(|i| passed.states[k * SLICES][i] - law.states[k][i]).collect()
+            };
+            (0..=holds).map(at).collect::<Vec<_>>()
+        };
+        let directions = (0..8_u32).map(|k| {
+            let (sin, cos) = (0.25 * core::f64::consts::PI * f64::from(k)).sin_cos();
+            [cos, sin, 0.0, 0.0]
+        });
+        let runs: Vec<_> = directions.map(|direction| run(direction, &mut draws)).collect();
+        plans.push(serde_json::json!({
+            "plant": name, "rates": declared.rates, "errors": declared.errors, "gains": declared.gains,
+            "times": law.times, "inputs": law.inputs, "states": law.states, "gain": law.gains,
+            "reach": reach, "runs": runs,
+        }));
+    }
+    plans
 }
