@@ -47,6 +47,11 @@ impl Deviation {
         self.state.copy_from_slice(x);
     }
 
+    /// Whether the plant, now at `x`, was not where the model led over the last `hold` s.
+    pub(super) fn is_displaced(&self, hold: f64, x: &[f64]) -> bool {
+        self.last.iter().zip(x).any(|(last, x)| last.abs() * hold > DECISIONS.covered * (1.0 + x.abs()))
+    }
+
     /// By how much each state may deviate from the model after `hold` s; `None` if every plan has a margin for it at `x`.
     pub(super) fn after(&self, hold: f64, x: &[f64]) -> Option<Vec<f64>> {
         let differs = self.rates.iter().map(|rate| rate * hold);

@@ -123,10 +123,9 @@ impl Decision<'_> {
         {
             self.end(AssuranceStatus::Lost, Some(failure));
         }
-        // The plan before kept the promise until its input acts.
         if self.now().status == AssuranceStatus::Assured
-            && !matches!(self.before().status, AssuranceStatus::Assured | AssuranceStatus::Undecided)
-            && let Err(failure) = self.planning().waits(&self.now().promises, self.measured, t)
+            && is_valid
+            && let Some(failure) = self.unguarded(at)
         {
             self.end(AssuranceStatus::Lost, Some(failure));
         }
@@ -324,6 +323,20 @@ impl Decision<'_> {
             planner.is_declared(&self.before().plan, t, x)
         });
         planned.err().filter(|failure| matches!(failure, Failure::Undeclared { .. }))
+    }
+
+    /// What is missed before the input of the sample acts, where no plan says that nothing is: it was lost, or an exact plant is
+    /// not where it led.
+    fn unguarded(&self, At { t, hold, x }: At<'_>) -> Option<Failure> {
+        let status = self.before().status;
+        let is_there = self.uncertainty.is_some() || !self.now().deviation.is_displaced(hold, x);
+        // The first plan was decided on with that time.
+        if status == AssuranceStatus::Undecided || status == AssuranceStatus::Assured && is_there {
+            return None;
+        }
+        let mut promises = self.now().promises.clone();
+        promises.iter_mut().flatten().for_each(|promise| (promise.margin, promise.reserve) = (0.0, 0.0));
+        self.planning().waits(&promises, self.measured, t).err()
     }
 
     /// What may be missed before the next sample under `u`, if the plant continues to deviate from the model as observed.
