@@ -11,6 +11,12 @@ use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::*;
 
+/// Shows a row of figures, for tests in the crate, which prints nothing itself.
+#[allow(clippy::print_stdout, reason = "the figures are wanted")]
+pub(crate) fn show(row: &str) {
+    std::println!("{row}");
+}
+
 pub(crate) const PERIOD: f64 = 0.02;
 pub(crate) const RADIUS: f64 = 2.0;
 pub(crate) const DEADLINE: f64 = 8.0;

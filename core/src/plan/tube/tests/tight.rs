@@ -6,8 +6,6 @@
 //! for certain. More cases, and tables:
 //! `PUNCTUAL_TIGHT=20 PUNCTUAL_TABLES=1 cargo test --release -p punctual-core --lib tight -- --nocapture`.
 
-#![allow(clippy::print_stdout, reason = "the figures are wanted")]
-
 #[path = "../../../../tests/uncertain/mod.rs"]
 mod uncertain;
 
@@ -32,8 +30,7 @@ use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
-use std::println;
-use uncertain::{ASKS, Adversary, Case, Declared, Draws, PERIOD, Run, run};
+use uncertain::{ASKS, Adversary, Case, Declared, Draws, PERIOD, Run, run, show};
 
 const FAULTS: [Fault; 6] =
     [Fault::Small, Fault::Samples, Fault::Error, Fault::Gain, Fault::Noise, Fault::Remainder];
@@ -348,10 +345,10 @@ fn tubes_are_tight() {
     ] {
         let (positions, states) = (spread(&mut found.positions), spread(&mut found.states));
         let inputs = spread(&mut found.inputs);
-        println!(
-            "| {name} | {} | {positions} | {states} | {inputs} | {:?} of {:?} |",
-            found.cases, found.found, FAULTS
-        );
+        show(&format!(
+            "| {name} | {} | {positions} | {states} | {inputs} | {:?} of {FAULTS:?} |",
+            found.cases, found.found
+        ));
         let median = found.positions[found.positions.len() / 2];
         assert!(median <= WANTED, "{name}: {positions}");
     }
@@ -485,7 +482,7 @@ fn a_tube_that_is_too_small_by_a_fiftieth_is_found() {
                     of_a_point_mass(holds, h, None).0[2 * i] / farthest(direction, holds, h)
                 })
                 .collect();
-            println!("point mass, {holds} holds of {h} s: {ratios:.4?} times what is possible");
+            show(&format!("point mass, {holds} holds of {h} s: {ratios:.4?} times what is possible"));
         }
     }
 }
@@ -645,7 +642,9 @@ fn table_of_defects_end_to_end() {
             withdrawn += usize::from(outcome.accepted && outcome.withdrawn > 0);
             least = least.min(outcome.least);
         }
-        println!("| {fault:?} | {accepted} | {broken} broken | {withdrawn} withdrawn | least {least:.4} m |");
+        show(&format!(
+            "| {fault:?} | {accepted} | {broken} broken | {withdrawn} withdrawn | least {least:.4} m |"
+        ));
         if fault.is_none() {
             assert_eq!((broken, withdrawn), (0, 0));
         }
