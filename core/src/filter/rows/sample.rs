@@ -365,7 +365,10 @@ impl Rows {
         }
         for (i, ui) in u.iter_mut().enumerate() {
             *ui = self.bounds.clamp(i, 0.0);
-            next.input[i] = *ui;
+            // Before the first input it is known without.
+            if self.state.time.is_some() || next.input[i] != 0.0 {
+                next.input[i] = *ui;
+            }
         }
     }
 
