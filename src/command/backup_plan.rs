@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use punctual_core::filter::{Filter, Plans};
+use punctual_core::filter::{Appraisal, Bears, Plans};
 use punctual_core::plan::{BackupPlan, Failure};
 use punctual_cosim::error::Error;
 use punctual_fmu::configuration::{FilterConfiguration, UNBOUNDED};
 use serde::Serialize;
 
 use super::closed_loop::LoopReport;
-use super::map;
+use super::{map, robustness};
 use crate::output::{self, number, number_above, number_below};
 
 /// The finding on backup plans from the start.
@@ -38,6 +38,12 @@ pub(super) struct BackupPlanReport {
     earliest: Vec<(String, f64)>,
     /// The plan with the configured deadlines, or otherwise with the earliest ones.
     plan: Option<PlanReport>,
+    /// What a plan bears if it is declared.
+    #[serde(skip)]
+    pub(super) bears: Option<Bears>,
+    /// With how much less declared it would be kept, in words.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    remedy: Option<String>,
     /// The pictures of the plan.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     files: Vec<String>,
@@ -85,6 +91,8 @@ pub(super) fn find(
         earliest_factor: None,
         earliest: Vec::new(),
         plan: None,
+        bears: None,
+        remedy: None,
         files: Vec::new(),
     };
     let filter = match c.assured(c.build()?) {
@@ -116,10 +124,8 @@ pub(super) fn find(
             .map(|at| (c.barrier[at.barrier].name.clone(), at.time, at.slack, unit(at.barrier))),
     };
     let has_deadline = c.barrier.iter().any(|barrier| barrier.deadline.is_some());
-    let (configured, earliest) = match has_deadline {
-        true => planning.appraise(t, x0, Plans::LONGEST),
-        false => (planning.plan_from(t, x0, 1.0), None),
-    };
+    let Appraisal { plan: configured, earliest, bears, .. } = planning.appraise(t, x0, Plans::LONGEST);
+    let remedy = configured.as_ref().err().and_then(|_| robustness::remedy(c, &filter, t, x0));
     let left_out = c.barrier.iter().zip(planning.promised(t, x0)).filter(|(_, promised)| !promised);
     let left_out = left_out.map(|(barrier, _)| barrier.name.clone()).collect();
     let reason = configured.as_ref().err().map(|failure| c.refusal(*failure));
@@ -148,34 +154,41 @@ pub(super) fn find(
         earliest_factor: earliest.as_ref().map(|(factor, _)| *factor),
         earliest: earliest.as_ref().map_or(Vec::new(), |(factor, _)| deadlines(*factor)),
         plan: shown.map(plan),
+        bears,
+        remedy,
         files,
     }))
 }
 
-/// One line with the earliest deadlines that have a plan from `x0`, for a refused promise.
-pub(super) fn in_time(c: &FilterConfiguration, x0: &[f64]) -> Result<Option<String>, Error> {
+/// One line with the earliest deadlines that have a plan from `x0`, for a refused promise, and one that says with how much less declared
+/// it would be kept.
+pub(super) fn in_time(c: &FilterConfiguration, x0: &[f64]) -> Result<Vec<String>, Error> {
     let has_deadline = c.barrier.iter().any(|barrier| barrier.deadline.is_some());
-    let filter = c.assured(c.build()?).ok().filter(|_| has_deadline);
-    let Some(planning) = filter.as_ref().and_then(Filter::planning) else { return Ok(None) };
+    let Ok(filter) = c.assured(c.build()?) else { return Ok(Vec::new()) };
     let (t, x0) = (c.experiment.start_time, &c.measured(x0)[..]);
+    let remedy = robustness::remedy(c, &filter, t, x0);
+    let Some(planning) = filter.planning().filter(|_| has_deadline) else {
+        return Ok(remedy.into_iter().collect());
+    };
     let line = match planning.later_deadline(t, x0, Plans::LONGEST) {
         Some((factor, _)) => {
             let earliest = c.barrier.iter().filter_map(|b| Some((&b.name, factor * b.deadline?)));
             let named: Vec<_> = earliest.map(|(name, at)| format!("{name} {} s", number(at))).collect();
             format!("earliest deadline with a plan: {}", named.join(", "))
         }
-        None if matches!(planning.plan_from(t, x0, 1.0), Err(Failure::Apart { .. })) => return Ok(None),
+        None if matches!(planning.plan_from(t, x0, 1.0), Err(Failure::Apart { .. })) => return Ok(Vec::new()),
         None => {
             format!("no plan was found for deadlines up to {} times as long either", Plans::LONGEST)
         }
     };
-    Ok(Some(line))
+    Ok([line].into_iter().chain(remedy).collect())
 }
 
 /// A `plan_horizon` for a file without one, as long as its latest deadline, and the time until which there is
 /// a plan with it.
 fn in_motion(c: &FilterConfiguration, x0: &[f64]) -> Option<[f64; 2]> {
-    if c.plan_horizon.is_some() {
+    // A plan for an uncertain plant ends in motion anyway.
+    if c.plan_horizon.is_some() || c.uncertainty.is_some() || !c.measurement_errors.is_empty() {
         return None;
     }
     let latest = c.barrier.iter().filter_map(|barrier| barrier.deadline).fold(0.0, f64::max);
@@ -228,6 +241,7 @@ impl BackupPlanReport {
                 number_below(until)
             ));
         }
+        lines.extend(self.remedy.clone());
         if !self.left_out.is_empty() {
             lines.push(format!("not promised from there, and not in the plan: {}", self.left_out.join(", ")));
         }

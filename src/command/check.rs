@@ -42,9 +42,6 @@ pub struct Arguments {
     /// Also find the profile and rate that need the smallest bound on the accelerations from the start
     #[arg(long)]
     effort: bool,
-    /// Also say how much wind, measurement error and wrong gain the plan from the start bears
-    #[arg(long)]
-    robustness: bool,
     /// Draw which starts can be promised, over two states: "x_p=-5..25,y_p=-5..15"; the others are as in the start, or 0
     #[arg(long, value_name = "RANGES", allow_hyphen_values = true)]
     map: Option<String>,
@@ -100,7 +97,7 @@ struct FilterReport {
     /// Inputs that profiles and rates require, the best first.
     #[serde(skip_serializing_if = "Option::is_none")]
     effort: Option<Vec<RatingReport>>,
-    /// What the plan bears of a plant that is not the model, if requested.
+    /// What a plan bears of a plant that is not the model, if nothing is declared of it.
     #[serde(skip_serializing_if = "Option::is_none")]
     robustness: Option<RobustnessReport>,
 }
@@ -240,10 +237,6 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                 let message = format!("simulates, but barrier {} is external: it has no model", barrier.name);
                 return Err(Error::configuration("--effort", message));
             }
-            if arguments.robustness && start.is_none() {
-                let message = "needs a start: give --plant, --x0, or [x0] in the file";
-                return Err(Error::configuration("--robustness", message));
-            }
             // Simulate and judge. Findings on a start refer to the state at which the filter is armed.
             let arm_after = configuration.arm_after;
             let configuration = configuration.armed_at_once();
@@ -251,12 +244,6 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             let effort = match &start {
                 Some(x0) if arguments.effort => {
                     Some(closed_loop::ratings(&configuration, x0, &wanted).map_err(|e| e.in_file(file))?)
-                }
-                _ => None,
-            };
-            let robustness = match &start {
-                Some(x0) if arguments.robustness => {
-                    RobustnessReport::of(&configuration, x0).map_err(|e| e.in_file(file))?
                 }
                 _ => None,
             };
@@ -270,7 +257,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
             let from = start.clone().unwrap_or_else(zeros);
             let mut report =
                 filter(&configuration, start, &wanted, out, arm_after).map_err(|e| e.in_file(file))?;
-            (report.effort, report.robustness) = (effort, robustness);
+            report.effort = effort;
             if let (Some(plane), Some(folder)) = (plane, out) {
                 report.map =
                     Some(map::starts(&configuration, &configuration.measured(&from), &plane, folder)?);
@@ -392,11 +379,15 @@ fn filter(
     let simulated = start.as_deref().filter(|_| c.external().is_none());
     let closed_loop = simulated.map(|x0| closed_loop::watch(c, x0, wanted)).transpose()?;
     let failed = closed_loop.as_ref().is_some_and(|run| !run.kept);
-    let damped =
-        simulated.filter(|_| failed && matches!(wanted, Wanted::None) && closed_loop::has_damping(c));
+    // Where an uncertain plant is refused, damping keeps no promise either.
+    let is_uncertain = c.is_assured() && (c.uncertainty.is_some() || !c.measurement_errors.is_empty());
+    let damped = simulated
+        .filter(|_| failed && !is_uncertain && matches!(wanted, Wanted::None) && closed_loop::has_damping(c));
     let with_damping = damped.map(|x0| closed_loop::watch(c, x0, &Wanted::Damping)).transpose()?;
     let backup_plan =
         simulated.map(|x0| backup_plan::find(c, x0, closed_loop.as_ref(), out)).transpose()?.flatten();
+    let bears = backup_plan.as_ref().filter(|_| c.is_assured()).and_then(|plan| plan.bears.as_ref());
+    let robustness = bears.map(|bears| RobustnessReport::new(c, bears));
     let (step, experiment) = (c.experiment.step_size, c.experiment);
     let mut warnings = Configuration::Filter(c.clone()).in_degrees();
     let runs_for = experiment.stop_time - experiment.start_time;
@@ -541,7 +532,7 @@ fn filter(
         backup_plan,
         map: None,
         effort: None,
-        robustness: None,
+        robustness,
     })
 }
 

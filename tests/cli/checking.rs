@@ -605,3 +605,51 @@ fn a_forest_is_promised_at_later_deadlines_too() {
         assert!(!format!("{}{}", run.stdout, run.stderr).contains("refused"), "{deadline} s: {run:#?}");
     }
 }
+
+/// A plan with room bears more than nothing of each kind. Half of what is said of one, declared, is promised.
+#[test]
+fn what_a_plan_bears_is_said_and_can_be_declared() {
+    let workshop = Workshop::new();
+    let file = |declared: &str| {
+        let sets = disc("goal", "disc", [15.0, 5.0], 2.0, "deadline = 8.0")
+            + &disc("rock", "obstacle", [9.0, 2.0], 1.5, "");
+        format!(
+            "kind = \"filter\"\nplant.model = \"unicycle\"\nbounds = {{ a = [-4.0, 4.0], omega = [-1.5, 1.5] }}\nx0 = {{ v = 1.5 }}\n{declared}\n\
+             experiment = {{ stop_time = 12.0, step_size = 0.02 }}\n{sets}"
+        )
+    };
+    workshop.write("car.toml", file(""));
+    let text = workshop.punctual(["check", "car.toml"]).success();
+    assert!(text.contains("it bears at least, each alone and declared: rates x_p "), "{text}");
+    assert!(text.contains("delay 20 ms, a step"), "{text}");
+    let report: Value =
+        serde_json::from_str(&workshop.punctual(["check", "car.toml", "--json"]).success()).expect("JSON");
+    let sizes = |kind: &str| -> Vec<f64> {
+        let of = report["robustness"][kind].as_array().expect("a list");
+        of.iter().map(|entry| entry[1].as_f64().expect("a number")).collect()
+    };
+    for kind in ["rates", "measurement_errors", "gains", "lags"] {
+        assert!(sizes(kind).iter().all(|size| *size > 0.0), "{kind}: {report:#}");
+    }
+    let [rate, gain, lag] = [sizes("rates")[3], sizes("gains")[0], sizes("lags")[1]].map(|size| 0.5 * size);
+    for declared in [
+        format!("uncertainty.rates.v = {rate}"),
+        format!("uncertainty.inputs.a.gain = [{}, {}]", 1.0 - gain, 1.0 + gain),
+        format!("uncertainty.inputs.omega.lag = [0.0, {lag}]"),
+    ] {
+        workshop.write("declared.toml", file(&declared));
+        let text = workshop.punctual(["check", "declared.toml"]).success();
+        assert!(text.contains("backup plan: found") && !text.contains("it bears"), "{declared}: {text}");
+    }
+}
+
+/// A refusal of an uncertain plant names what it would be kept without.
+#[test]
+fn a_refusal_says_with_how_much_less_declared_it_would_be_kept() {
+    let workshop = Workshop::new();
+    let windy = fs::read_to_string(examples().join("windy.toml")).expect("the example");
+    workshop.write("late.toml", windy.replace("[uncertainty]\n", "[uncertainty]\njitter = 0.05\n"));
+    let done = workshop.punctual(["check", "late.toml"]);
+    assert_eq!(done.code, 1, "{done:#?}");
+    assert!(done.stdout.contains("it would be kept without jitter"), "{done:#?}");
+}

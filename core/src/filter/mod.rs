@@ -25,7 +25,10 @@ pub use crate::convergence::{
 #[cfg(feature = "plan")]
 pub use crate::plan::Motion;
 #[cfg(feature = "plan")]
-pub use backup::{Assurance, AssuranceStatus, Bears, Driver, PlanState, Planning, Plans, Reason};
+pub use backup::{
+    Appraisal, Assurance, AssuranceStatus, Bears, Declared, Driver, PlanState, Planning, Plans, Reason,
+    Remedy,
+};
 pub use builder::FilterBuilder;
 pub use integrator::Integration;
 pub use report::{BarrierReport, Report, Status};

@@ -215,3 +215,33 @@ pub(super) fn largest_eigenvalue(matrix: &DMatrix<f64>) -> f64 {
         elementary::sqrt(squares.max())
     })
 }
+
+/// The largest h found by climbing from `x` at `t`, up to `enough`, in so many steps, each with so many halvings.
+pub(crate) fn highest(
+    model: &dyn Predict,
+    (t, x): (f64, &[f64]),
+    enough: f64,
+    [climbs, halvings]: [u32; 2],
+) -> f64 {
+    let (mut x, mut gradient, mut next) = (x.to_vec(), x.to_vec(), x.to_vec());
+    let mut h = model.value(t, &x);
+    for _ in 0..climbs {
+        slopes(model, t, &x, &mut gradient);
+        let steepness: f64 = gradient.iter().map(|g| g * g).sum();
+        let mut length = (enough - h) / steepness;
+        let climbs = (0..halvings).any(|_| {
+            for (next, (x, g)) in next.iter_mut().zip(x.iter().zip(&gradient)) {
+                *next = x + length * g;
+            }
+            length *= 0.5;
+            model.value(t, &next) > h
+        });
+        // From NaN there is no way up.
+        if h >= enough || !climbs {
+            break;
+        }
+        x.copy_from_slice(&next);
+        h = model.value(t, &x);
+    }
+    h
+}

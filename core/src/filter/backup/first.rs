@@ -1,7 +1,9 @@
 //! The first sample: the plan on which the promises rest, and the earliest deadlines that a plan keeps.
 
 use alloc::vec::Vec;
+use core::cell::Cell;
 
+use super::bears::Bears;
 use super::planning::Planning;
 use super::settings::{DECISIONS, DecisionSettings};
 use super::state::Promise;
@@ -16,6 +18,22 @@ pub(super) struct First {
     pub(super) plan: Plan,
     /// Whether the plan is from before the filter was armed again.
     pub(super) is_old: bool,
+}
+
+/// What plans can do from a state.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct Appraisal {
+    /// The plan for the deadlines themselves.
+    ///
+    /// # Errors
+    ///
+    /// Why the nearest trial fails.
+    pub plan: Result<BackupPlan, Failure>,
+    /// The least factor on every deadline with which a plan is found, and that plan; `None` without a deadline.
+    pub earliest: Option<(f64, BackupPlan)>,
+    /// What the plan for the deadlines themselves bears.
+    pub bears: Option<Bears>,
 }
 
 impl Planning<'_> {
@@ -34,24 +52,22 @@ impl Planning<'_> {
             .map(|First { promises, plan, .. }| own.dated(plan.backup_plan, t, &promises))
     }
 
-    /// The result of [`Self::plan_from`] for the deadlines themselves, and [`Self::earliest_deadline`], with one search for
-    /// both.
-    pub fn appraise(
-        &self,
-        t: f64,
-        x: &[f64],
-        longest: f64,
-    ) -> (Result<BackupPlan, Failure>, Option<(f64, BackupPlan)>) {
+    /// What [`Self::plan_from`] finds for the deadlines themselves, [`Self::earliest_deadline`], and what that plan
+    /// [bears](Self::bears), with one search for all.
+    pub fn appraise(&self, t: f64, x: &[f64], longest: f64) -> Appraisal {
         let (measured, courses) = (self.state(x), self.courses(t, x));
         let own = Planning { measured: Some((t, &measured)), courses: &courses, ..*self };
         let (acts, state) = self.acts(t, &measured);
         let promises = own.promises(acts, &state, |_| 1.0);
+        let has_deadline = self.rows.slots.iter().any(|slot| slot.promise.settings().deadline.is_some());
+        let later = |first| if has_deadline { self.least(t, x, longest, first) } else { None };
         match own.first(promises, (acts, self.plans.period), &state, &[], &DECISIONS.shorter) {
-            Ok(first) => {
-                let plan = own.dated(first.plan.backup_plan.clone(), acts, &first.promises);
-                (Ok(plan), self.least(t, x, longest, Some(first)))
-            }
-            Err(failure) => (Err(failure), self.least(t, x, longest, None)),
+            Ok(first) => Appraisal {
+                bears: self.borne_by(&first, t, x),
+                plan: Ok(own.dated(first.plan.backup_plan.clone(), acts, &first.promises)),
+                earliest: later(Some(first)),
+            },
+            Err(failure) => Appraisal { plan: Err(failure), earliest: later(None), bears: None },
         }
     }
 
@@ -68,7 +84,12 @@ impl Planning<'_> {
     /// The factor is accurate to a fiftieth, or less if a plan arrives sooner than it has to. The search goes no further
     /// than `longest` times the deadlines, nor to a deadline after the end of its barrier.
     pub fn earliest_deadline(&self, t: f64, x: &[f64], longest: f64) -> Option<(f64, BackupPlan)> {
-        self.appraise(t, x, longest).1
+        let measured = self.state(x);
+        let own = Planning { measured: Some((t, &measured)), ..*self };
+        let (acts, state) = self.acts(t, &measured);
+        let promises = self.promises(acts, &state, |_| 1.0);
+        let first = own.first(promises, (acts, self.plans.period), &state, &[], &DECISIONS.shorter);
+        self.least(t, x, longest, first.ok())
     }
 
     /// The same if [none is found](Self::plan_from) for the deadlines themselves; these are not tried again.
@@ -111,9 +132,15 @@ impl Planning<'_> {
         let arrived = |factor: f64, First { promises, plan, .. }: First| {
             (factor * own.arrival(&promises, &plan, t, x), plan)
         };
+        // An uncertain plant that runs away from a plan runs farther from a longer one.
+        let runs_away = Cell::new(false);
         let find = |factor: f64| {
-            let found = own.first(promised(factor), (t, self.plans.period), x, &[], &[]).ok()?;
-            Some(arrived(factor, found))
+            if runs_away.get() {
+                return None;
+            }
+            let found = own.first(promised(factor), (t, self.plans.period), x, &[], &[]);
+            runs_away.set(matches!(found, Err(Failure::Spreads)));
+            Some(arrived(factor, found.ok()?))
         };
         let sooner = |factor: f64, (before, plan): &(f64, Plan)| {
             let found =
@@ -150,9 +177,12 @@ impl Planning<'_> {
         let mut found = search(&promises);
         if found.is_err() && promises.iter().flatten().any(|promise| promise.reserve > promise.margin) {
             promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);
-            found = search(&promises);
+            // A tube that runs away does so without a reserve too.
+            if !matches!(found, Err(Failure::Spreads)) {
+                found = search(&promises);
+            }
         }
-        if let Err(Failure::Broken { .. } | Failure::Unsteady) = found
+        if let Err(Failure::Broken { .. } | Failure::Unsteady | Failure::Spreads) = found
             && self.plans.horizon.is_none()
             && !self.is_ruled_out(&promises, at.0, x)
         {

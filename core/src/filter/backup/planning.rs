@@ -14,7 +14,7 @@ use crate::filter::{Begin, End, Integration, Strictness};
 use crate::lie::Predict;
 use crate::plan::{
     BackupPlan, Course, Failure, Integral, Limit, Motion, Moving, Planner, Requirement, SETTINGS, TOLERANCES,
-    Uncertain, Uncertainty, narrowed, slopes,
+    Uncertain, Uncertainty, highest, narrowed, slopes,
 };
 use crate::qp::Bounds;
 
@@ -517,37 +517,12 @@ impl<'a> Planning<'a> {
 
 /// The margin that plans keep for a barrier with the value `h` at `t` and `x`.
 fn margin(model: &dyn Predict, t: f64, x: &[f64], h: f64) -> f64 {
-    let DecisionSettings { margin, resolved: [least, part], room, .. } = DECISIONS;
+    let DecisionSettings { margin, resolved: [least, part], room, climbs, climb_halvings, .. } = DECISIONS;
     let mut gradient = x.to_vec();
     slopes(model, t, x, &mut gradient);
     let resolved: f64 = x.iter().zip(&gradient).map(|(x, g)| g.abs() * (least + part * x.abs())).sum();
     // NaN fails this comparison on purpose.
     let wanted = (margin * h.abs()).max(resolved);
-    let highest = highest(model, t, x, wanted / room);
+    let highest = highest(model, (t, x), wanted / room, [climbs, climb_halvings]);
     if highest > 0.0 { wanted.min(room * highest) } else { wanted }
-}
-
-/// The largest h found by climbing from `x` at `t`, up to `enough`.
-fn highest(model: &dyn Predict, t: f64, x: &[f64], enough: f64) -> f64 {
-    let (mut x, mut gradient, mut next) = (x.to_vec(), x.to_vec(), x.to_vec());
-    let mut h = model.value(t, &x);
-    for _ in 0..DECISIONS.climbs {
-        slopes(model, t, &x, &mut gradient);
-        let steepness: f64 = gradient.iter().map(|g| g * g).sum();
-        let mut length = (enough - h) / steepness;
-        let climbs = (0..DECISIONS.climb_halvings).any(|_| {
-            for (next, (x, g)) in next.iter_mut().zip(x.iter().zip(&gradient)) {
-                *next = x + length * g;
-            }
-            length *= 0.5;
-            model.value(t, &next) > h
-        });
-        // From NaN there is no way up.
-        if h >= enough || !climbs {
-            break;
-        }
-        x.copy_from_slice(&next);
-        h = model.value(t, &x);
-    }
-    h
 }

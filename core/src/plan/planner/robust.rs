@@ -11,8 +11,9 @@ use alloc::vec::Vec;
 use super::Planner;
 use crate::MAX_INPUTS;
 use crate::plan::check::{Grid, Walk};
+use crate::plan::settings::{SETTINGS, SearchSettings};
 use crate::plan::tube::{Lacks, Tracking, Tube, Uncertainty, gains};
-use crate::plan::{BackupPlan, Failure, Plan, Requirement};
+use crate::plan::{BackupPlan, Failure, Plan, Requirement, highest};
 use crate::qp::Bounds;
 
 /// What is not known of the plant, its bounds, of which the nominal plan leaves a part, and how far in s a plan has to reach
@@ -53,10 +54,18 @@ const HOLDS: [usize; 2] = [250, 800];
 const LONGER: f64 = 1.25;
 /// A plan that ends sooner than this part of the horizon after the last deadline is prolonged by its law.
 const SHORT: f64 = 0.7;
+/// The search for a plan that leaves room: a short one, since another room is tried if it finds none.
+const CAUTIOUS: SearchSettings =
+    SearchSettings { beside_grids: 1, beside_rounds: [(3, 3), (1, 8)], tightened: 4, ..SETTINGS };
 /// Rounds of search and tube.
 const ROUNDS: u32 = 8;
 /// Factor on what the last round lacked.
 const MORE: f64 = 1.2;
+/// The loss of h, as a part of the largest |h| along the plan, from which on a tube runs away: no other plan mends that. Plans that are
+/// found lose less than 1 in the first round.
+const AWAY: f64 = 10.0;
+/// Steps uphill in the search for the largest h of a set, and halvings of such a step.
+const CLIMBS: [u32; 2] = [60, 30];
 
 /// What a nominal search is asked for beside the requirements.
 #[derive(Clone)]
@@ -97,7 +106,7 @@ impl<'a> Planner<'a> {
             raised: vec![0.0; self.requirements.len()],
             since: vec![f64::INFINITY; self.requirements.len()],
         };
-        let (mut failure, mut last): (Option<Failure>, Option<Asks>) = (None, None);
+        let (mut failure, mut last): (Option<Failure>, Option<(Asks, Plan)>) = (None, None);
         for _ in 0..ROUNDS {
             let bounds = narrowed(uncertain.bounds, &asks.reserve);
             // A state near the edge of a set has until then to leave it.
@@ -110,11 +119,16 @@ impl<'a> Planner<'a> {
             let requirements: Vec<Requirement<'_>> =
                 self.requirements.iter().copied().chain(raised).collect();
             let nominal = Planner { uncertain: None, bounds: &bounds, requirements: &requirements, ..*self };
-            let plan = match nominal.search(t, x) {
+            // What no state of a set has needs no search.
+            let is_vain = last.as_ref().is_some_and(|(_, before)| {
+                requirements[self.requirements.len()..].iter().any(|r| lacks_room(r, x, before))
+            });
+            let found = if is_vain { Err(Failure::Spreads) } else { nominal.search(t, x) };
+            let plan = match found {
                 Ok(plan) => plan,
                 // Half of the last step may be possible.
                 Err(nearest) => match &last {
-                    Some(last) => {
+                    Some((last, _)) => {
                         asks = asks.between(last);
                         failure.get_or_insert(nearest);
                         continue;
@@ -126,6 +140,10 @@ impl<'a> Planner<'a> {
                 Ok(backup_plan) => return Ok(Plan { backup_plan, reserve: asks.reserve, ..plan }),
                 Err(lacks) => (lacks, asks.clone()),
             };
+            let sizes = self.sizes(&plan);
+            if lacks.falls.iter().zip(&sizes).any(|(fall, size)| *fall > AWAY * size) {
+                return Err(Failure::Spreads);
+            }
             failure = lacks.failure;
             for (raised, missing) in asks.raised.iter_mut().zip(&lacks.missing) {
                 *raised += MORE * missing;
@@ -138,9 +156,19 @@ impl<'a> Planner<'a> {
                     *reserve = (*reserve + MORE * over + 0.01 * reach).min(MOST_RESERVE * reach);
                 }
             }
-            last = Some(found);
+            last = Some((found, plan));
         }
         Err(failure.unwrap_or(Failure::Spreads))
+    }
+
+    /// The largest |h| of every requirement along `plan`.
+    fn sizes(&self, plan: &Plan) -> Vec<f64> {
+        let size = |requirement: &Requirement<'_>| {
+            let along = plan.reference.iter().flat_map(|r| r.times.iter().zip(&r.states));
+            let h = along.map(|(t, x)| requirement.model.value(*t, x).abs());
+            h.fold(requirement.margin.max(f64::MIN_POSITIVE), f64::max)
+        };
+        self.requirements.iter().map(size).collect()
     }
 
     /// `nominal`, a plan from `x` at `t`, with the law that keeps its requirements for the uncertain plant: that of `plan`, if
@@ -163,17 +191,120 @@ impl<'a> Planner<'a> {
             .map_err(|lacks| lacks.failure.unwrap_or(Failure::Spreads))
     }
 
-    /// Whether a law along `plan`, from `x` at `t`, keeps every requirement for the uncertain plant.
+    /// The same planner for a sample at `t` and `x` whose input acts `delay` s later.
+    #[must_use]
+    pub(crate) fn delayed(self, delay: f64, t: f64, x: &'a [f64]) -> Self {
+        let uncertain = self.uncertain.map(|of| Uncertain { delay, measured: Some((t, x)), ..of });
+        Self { uncertain, ..self }
+    }
+
+    /// A plan for the model from `x` at `t`, near `plan`, that leaves a part of every bound to a feedback.
     ///
     /// # Errors
     ///
-    /// What it lacks.
-    pub(crate) fn bears(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<(), Failure> {
+    /// Why the nearest trial fails.
+    pub(crate) fn cautious(&self, plan: &Plan, t: f64, x: &[f64]) -> Result<Plan, Failure> {
         let uncertain = self.uncertain.ok_or(Failure::Nothing)?;
-        match self.tracked(uncertain, plan, (t, x), 1.0, false)? {
+        let reserve: Vec<f64> = self.reaches(uncertain).iter().map(|reach| FIRST_RESERVE * reach).collect();
+        let bounds = narrowed(uncertain.bounds, &reserve);
+        let settings = &CAUTIOUS;
+        Planner { uncertain: None, bounds: &bounds, settings, ..*self }.beside(plan, 1.0).search(t, x)
+    }
+
+    /// The laws along `plan` from `x` at `t`: the one that it has, or those that a search tries first, with about `holds` holds.
+    pub(crate) fn laws(
+        &self,
+        plan: &Plan,
+        holds: usize,
+        t: f64,
+        x: &[f64],
+    ) -> Result<Vec<Tracking>, Failure> {
+        let uncertain = self.uncertain.ok_or(Failure::Nothing)?;
+        let samples = self.samples(plan, self.until_of(uncertain, plan, t), t)?;
+        let before = plan.backup_plan.tracking.as_deref();
+        let longest = before.map_or(samples.div_ceil(holds), |before| self.longest(before));
+        Ok(self.laws_of(uncertain, plan, (t, x), (samples, longest)))
+    }
+
+    /// Whether `law` along `plan`, which begins at `x`, keeps every requirement for the uncertain plant.
+    ///
+    /// # Errors
+    ///
+    /// The first thing that it lacks.
+    pub(crate) fn bears(&self, plan: &Plan, law: &Tracking, x: &[f64]) -> Result<(), Failure> {
+        let uncertain = self.uncertain.ok_or(Failure::Nothing)?;
+        let until = self.until_of(uncertain, plan, law.times[0]);
+        match self.checked(uncertain, plan, law.clone(), (until, x), (1.0, false))? {
             Ok(_) => Ok(()),
             Err(lacks) => Err(lacks.failure.unwrap_or(Failure::Spreads)),
         }
+    }
+
+    /// Whether any of the [laws](Self::laws) along `plan` from `x` at `t` keeps every requirement for the uncertain plant.
+    ///
+    /// # Errors
+    ///
+    /// The first thing that the last one lacks.
+    pub(crate) fn any_bears(&self, plan: &Plan, holds: usize, t: f64, x: &[f64]) -> Result<(), Failure> {
+        let mut failure = Failure::Spreads;
+        for law in self.laws(plan, holds, t, x)? {
+            match self.bears(plan, &law, x) {
+                Ok(()) => return Ok(()),
+                Err(found) => failure = found,
+            }
+        }
+        Err(failure)
+    }
+
+    /// The time in s until which `plan` from `t` on has to be kept.
+    fn until_of(&self, uncertain: Uncertain<'_>, plan: &Plan, t: f64) -> f64 {
+        match plan.is_finite() {
+            true => plan.backup_plan.until,
+            false => (self.last(t) + uncertain.horizon).max(self.before.map_or(t, |before| before.until)),
+        }
+    }
+
+    /// The number of samples from `t` to `until`.
+    fn samples(&self, plan: &Plan, until: f64, t: f64) -> Result<usize, Failure> {
+        // A plan that ends in motion is known until then only.
+        let part = if plan.is_finite() { 1.0 - 1e-9 } else { 1.0 };
+        let samples = ((until - t) / self.period * part) as usize + 1;
+        if samples > self.settings.most_samples { Err(Failure::TooLong) } else { Ok(samples) }
+    }
+
+    /// The number of samples in the longest hold of `law`.
+    fn longest(&self, law: &Tracking) -> usize {
+        ((law.longest_hold() / self.period + 0.5) as usize).max(1)
+    }
+
+    /// The laws along `plan` from `x` at `t` for so many `samples`, with holds of up to `longest` ones: with the gains that it has, if
+    /// it has any.
+    fn laws_of(
+        &self,
+        uncertain: Uncertain<'_>,
+        plan: &Plan,
+        (t, x): (f64, &[f64]),
+        (samples, longest): (usize, usize),
+    ) -> Vec<Tracking> {
+        let slack = self.tolerances.on_time * self.period;
+        // Where samples may come late, each hold has one.
+        let (jitter, whole) = (uncertain.of.jitter, uncertain.of.jitter as usize);
+        let quickest = whole.saturating_add(1 + usize::from(jitter > whole as f64)).min(samples);
+        let times: Vec<f64> =
+            begins(samples, [quickest, longest]).into_iter().map(|k| t + k as f64 * self.period).collect();
+        let (states, inputs) = self.reference(plan, &times, x);
+        let gains = match plan.backup_plan.tracking.as_deref() {
+            Some(before) => {
+                let kept = |k: usize| before.gain_at(times[k], slack).map(<[f64]>::to_vec);
+                (0..inputs.len()).map(kept).collect::<Option<Vec<_>>>().into_iter().collect()
+            }
+            None => gains(self.plant, (&times, &states, &inputs), &self.reaches(uncertain)),
+        };
+        let law = |mut gains: Vec<Vec<f64>>| {
+            gains[0].clear();
+            Tracking { times: times.clone(), inputs: inputs.clone(), gains, ..Tracking::default() }
+        };
+        gains.into_iter().map(law).collect()
     }
 
     /// The backup plan of `plan` from `x` at `t`, with the law that keeps every requirement for the uncertain plant. Gains
@@ -190,55 +321,22 @@ impl<'a> Planner<'a> {
         strictness: f64,
         records: bool,
     ) -> Result<Result<BackupPlan, Box<Lacks>>, Failure> {
-        let until = match plan.is_finite() {
-            true => plan.backup_plan.until,
-            false => (self.last(t) + uncertain.horizon).max(self.before.map_or(t, |before| before.until)),
-        };
-        // A plan that ends in motion is known until then only.
-        let part = if plan.is_finite() { 1.0 - 1e-9 } else { 1.0 };
-        let samples = ((until - t) / self.period * part) as usize + 1;
-        if samples > self.settings.most_samples {
-            return Err(Failure::TooLong);
-        }
-        let before = plan.backup_plan.tracking.as_deref();
-        let longest = match before {
+        let until = self.until_of(uncertain, plan, t);
+        let samples = self.samples(plan, until, t)?;
+        let longest = match plan.backup_plan.tracking.as_deref() {
             // As quick as the law that is kept.
-            Some(before) => vec![((before.longest_hold() / self.period + 0.5) as usize).max(1)],
+            Some(before) => vec![self.longest(before)],
             None => HOLDS.iter().map(|holds| samples.div_ceil(*holds)).collect(),
         };
-        let slack = self.tolerances.on_time * self.period;
         let (mut least, mut failure) = (None, Failure::Spreads);
-        // Where samples may come late, each hold has one.
-        let (jitter, whole) = (uncertain.of.jitter, uncertain.of.jitter as usize);
-        let quickest = whole.saturating_add(1 + usize::from(jitter > whole as f64)).min(samples);
         for longest in longest {
             // What the quickest law lacks counts.
             least = None;
-            let times: Vec<f64> = begins(samples, [quickest, longest])
-                .into_iter()
-                .map(|k| t + k as f64 * self.period)
-                .collect();
-            let (states, inputs) = self.reference(plan, &times, x);
-            let kept =
-                |k: usize| before.and_then(|before| before.gain_at(times[k], slack)).map(<[f64]>::to_vec);
-            let gains = match before {
-                Some(_) => (0..inputs.len()).map(kept).collect::<Option<Vec<_>>>().into_iter().collect(),
-                None => gains(self.plant, (&times, &states, &inputs), &self.reaches(uncertain)),
-            };
-            for mut gains in gains {
-                gains[0].clear();
-                let reference =
-                    Tracking { times: times.clone(), inputs: inputs.clone(), gains, ..Tracking::default() };
-                match self.checked(uncertain, plan, reference, (until, x), (strictness, records)) {
+            for law in self.laws_of(uncertain, plan, (t, x), (samples, longest)) {
+                match self.checked(uncertain, plan, law, (until, x), (strictness, records)) {
                     Ok(Ok(backup_plan)) => return Ok(Ok(backup_plan)),
                     Ok(Err(lacks)) => {
-                        let parts =
-                            lacks.missing.iter().zip(&lacks.falls).map(|(missing, fall)| missing / fall);
-                        let reaches = self.reaches(uncertain);
-                        let parts =
-                            parts.chain(lacks.reserve.iter().zip(reaches).map(|(over, reach)| over / reach));
-                        // Nothing is missing where nothing falls.
-                        let size: f64 = parts.filter(|part| !part.is_nan()).sum();
+                        let size = self.size_of(uncertain, &lacks);
                         if least.as_ref().is_none_or(|(before, _)| size < *before) {
                             least = Some((size, lacks));
                         }
@@ -248,6 +346,14 @@ impl<'a> Planner<'a> {
             }
         }
         least.map(|(_, lacks)| Err(lacks)).ok_or(failure)
+    }
+
+    /// How much `lacks` is: of each requirement as a part of what h loses, of each input as a part of its bounds, in all.
+    fn size_of(&self, uncertain: Uncertain<'_>, lacks: &Lacks) -> f64 {
+        let parts = lacks.missing.iter().zip(&lacks.falls).map(|(missing, fall)| missing / fall);
+        let over = lacks.reserve.iter().zip(self.reaches(uncertain)).map(|(over, reach)| over / reach);
+        // Nothing is missing where nothing falls.
+        parts.chain(over).filter(|part| !part.is_nan()).sum()
     }
 
     /// The states at these `times`, and the inputs held between, of the nominal `plan` from `x`.
@@ -433,6 +539,16 @@ impl<'a> Planner<'a> {
         let planner = Planner { bounds: uncertain.bounds, ..*self };
         (0..self.dims[1]).map(|i| planner.model(self.period).reach(i, self.size)).collect()
     }
+}
+
+/// Whether no state is known that meets `requirement` with its reserve: none uphill of the start `x`, or of where `before` leads.
+fn lacks_room(requirement: &Requirement<'_>, x: &[f64], before: &Plan) -> bool {
+    let Requirement { model, from, reserve, .. } = *requirement;
+    let end = before.reference.as_ref().and_then(|reference| reference.states.last());
+    [Some(x), end.map(Vec::as_slice)]
+        .into_iter()
+        .flatten()
+        .all(|x| highest(model, (from, x), reserve, CLIMBS) < reserve * (1.0 - 1e-9))
 }
 
 /// The samples at which the holds of a law begin, of `samples` samples, and the end of the last. After the first they get
