@@ -618,6 +618,17 @@ pub(super) fn notes_before_run(c: &FilterConfiguration, refused: bool) -> Result
             );
         }
     }
+    if c.actuation_delay > 0.0 {
+        let delay = number(c.actuation_delay);
+        let is_model = c.run.simulated.is_none() && c.integrator.is_none();
+        known.push(match is_model {
+            true => format!("each input acts {delay} s after its sample, as actuation_delay says"),
+            false => format!(
+                "the plant that is simulated is not the filter's model, so that its inputs act at once, and not {delay} s late as \
+                 actuation_delay says"
+            ),
+        });
+    }
     if refused {
         known.extend(backup_plan::in_time(c, &x0)?);
     }

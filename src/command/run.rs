@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use clap::ValueEnum;
 use punctual_core::filter::AssuranceStatus;
 use punctual_cosim::coupling::{
-    self, Interference, Kept, Model, Order, Outcome, Own, Promise, Simulation, System,
+    self, Interference, Kept, Model, Order, Outcome, Own, Promise, Simulation, Steps, System,
 };
 use punctual_cosim::error::Error;
 use punctual_cosim::host::journal;
@@ -206,6 +206,14 @@ struct Opened {
     filter: Option<Box<FilterConfiguration>>,
 }
 
+/// Lets `simulation` have steps of drawn lengths, or notes why they are all the same.
+fn draw_steps(simulation: &mut Simulation, drawn: Steps) {
+    match drawn {
+        Ok(drawn) => simulation.set_steps(drawn),
+        Err(why) => simulation.note(why),
+    }
+}
+
 /// Opens a system file, or the file of a filter.
 fn open(arguments: &Arguments) -> Result<Opened, Error> {
     let (path, out) = (&arguments.system, arguments.out.clone());
@@ -215,8 +223,9 @@ fn open(arguments: &Arguments) -> Result<Opened, Error> {
         let (mut simulation, mut models) =
             Simulation::new(&system, path.parent().unwrap_or(Path::new("")), package::read_configuration)?;
         if let Some(seed) = arguments.uncertainty {
-            coupling::draw(&system, &mut models, seed, "--uncertainty")?;
+            let drawn = coupling::draw(&system, &mut models, seed, "--uncertainty")?;
             simulation = Simulation::of(&system, &models)?;
+            draw_steps(&mut simulation, drawn);
         }
         models.iter().filter_map(Model::stale).for_each(|note| output::note(&note));
         return Ok(Opened { system, models, simulation, out, filter: None });
@@ -233,10 +242,11 @@ fn open(arguments: &Arguments) -> Result<Opened, Error> {
     let system = System::parse(&text)?;
     let own = |configuration| Own::new(configuration).map(|own| Model::Own(Box::new(own), path.to_owned()));
     let mut models = configurations.into_iter().map(own).collect::<Result<Vec<_>, _>>()?;
-    if let Some(seed) = arguments.uncertainty {
-        coupling::draw(&system, &mut models, seed, "--uncertainty")?;
+    let drawn = arguments.uncertainty.map(|seed| coupling::draw(&system, &mut models, seed, "--uncertainty"));
+    let mut simulation = Simulation::of(&system, &models)?;
+    if let Some(drawn) = drawn.transpose()? {
+        draw_steps(&mut simulation, drawn);
     }
-    let simulation = Simulation::of(&system, &models)?;
     let out = Some(out.unwrap_or_else(|| stem(path).into()));
     Ok(Opened { system, models, simulation, out, filter })
 }

@@ -229,3 +229,65 @@ fn the_example_can_be_drawn() {
     workshop.punctual(["campaign", "c.toml"]).success();
     assert_eq!(column(&workshop, "filter.promise"), ["kept", "kept"]);
 }
+
+/// With `jitter` a step is late by at most that part of one, or early, and every run draws its own. The promise holds all the same.
+#[test]
+fn steps_are_drawn_where_a_filter_declares_jitter() {
+    const JITTER: f64 = 0.1;
+    const STEP: f64 = 0.05;
+    let exact = FILTER.lines().filter(|line| !line.starts_with("measurement_errors")).map(|line| match line
+        .starts_with("uncertainty")
+    {
+        true => format!("uncertainty = {{ rates = {{ v_x = 0.02 }}, jitter = {JITTER} }}"),
+        false => line.to_owned(),
+    });
+    let workshop = workshop(&exact.collect::<Vec<_>>().join("\n"), &campaign(6, ""));
+    let run = |seed: &str| {
+        let done = workshop.punctual(["run", "filter.toml", "--out", "out", "--uncertainty", seed]);
+        assert_eq!(done.code, 0, "{done:#?}");
+        let table = Table::parse(&workshop.text("out/filter.csv"));
+        assert!(table.column("filter.goal.guaranteed").iter().all(|flag| *flag == 1.0), "{seed}");
+        table.column("time")
+    };
+    let (mut longest, mut shortest) = (0.0_f64, f64::INFINITY);
+    for seed in ["1", "2", "3", "4"] {
+        let times = run(seed);
+        assert_eq!((times[0], times[times.len() - 1]), (0.0, 8.0));
+        // The last step ends at the stop time, and may be short.
+        let steps: Vec<f64> = times.windows(2).map(|two| two[1] - two[0]).collect();
+        for step in &steps[..steps.len() - 1] {
+            (longest, shortest) = (longest.max(*step), shortest.min(*step));
+        }
+    }
+    // Round-off of times up to 8 s.
+    assert!((longest - (1.0 + JITTER) * STEP).abs() < 1e-12, "{longest}");
+    assert!((shortest - 0.2 * STEP).abs() < 1e-12, "{shortest}");
+    assert_eq!(run("1"), run("1"));
+    workshop.punctual(["campaign", "c.toml"]).success();
+    assert_eq!(column(&workshop, "filter.promise"), vec!["kept"; 6]);
+}
+
+/// The plant of a filter's file gets each input as late as the file says, and the filter knows.
+#[test]
+fn a_declared_delay_is_simulated() {
+    const DELAY: f64 = 0.03;
+    let exact = FILTER
+        .lines()
+        .filter(|line| !line.starts_with("measurement_errors") && !line.starts_with("uncertainty"));
+    let exact = exact.collect::<Vec<_>>().join("\n");
+    let run = |text: &str| {
+        let workshop = workshop(text, "");
+        let done = workshop.punctual(["run", "filter.toml", "--out", "out", "--require", "guaranteed"]);
+        assert_eq!(done.code, 0, "{done:#?}");
+        let table = Table::parse(&workshop.text("out/filter.csv"));
+        (done.stderr, table.column("plant.x.v_x")[1], table.column("filter.u.u_x")[0])
+    };
+    let late = exact.replacen("[[barrier]]", &format!("actuation_delay = {DELAY}\n[[barrier]]"), 1);
+    let (said, v, u) = run(&late);
+    // v = 1 + u (0.05 s − delay) after a step: nothing acts before. Round-off of the integration.
+    assert!((v - (1.0 + u * (0.05 - DELAY))).abs() < 1e-9 && u != 0.0, "{v}, {u}");
+    assert!(said.contains("each input acts 0.03 s after its sample, as actuation_delay says"), "{said}");
+    let (said, v, u) = run(&exact);
+    assert!((v - (1.0 + u * 0.05)).abs() < 1e-9, "{v}, {u}");
+    assert!(!said.contains("actuation_delay"), "{said}");
+}

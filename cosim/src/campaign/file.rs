@@ -15,7 +15,9 @@ use uuid::Uuid;
 use super::distribution::{Distribution, VarySection};
 use super::part::Part;
 use super::sampling::{MAX_RUNS, Sampler, Sampling};
-use crate::coupling::{self, Grid, Role, Sequence, Simulation, StartValue, System, check_fed, links, port};
+use crate::coupling::{
+    self, DrawnSteps, Grid, Role, Sequence, Simulation, StartValue, System, check_fed, links, port,
+};
 use crate::error::Error;
 use crate::host::{Causality, DataType, Variability};
 use crate::package;
@@ -185,6 +187,8 @@ pub struct Campaign {
     seed: u64,
     runs: u64,
     success: Success,
+    /// How the steps of a run are drawn, if they are.
+    steps: Option<DrawnSteps>,
     /// The filters whose plants deviate.
     declared: Vec<Declared>,
     notes: Vec<String>,
@@ -323,8 +327,8 @@ impl Campaign {
         let mut models = components
             .map(|(text, component)| Part::of(text, component, system_path))
             .collect::<Result<Vec<_>, Error>>()?;
-        let declared = match section.uncertainty {
-            Uncertainty::None => Vec::new(),
+        let (declared, steps) = match section.uncertainty {
+            Uncertainty::None => (Vec::new(), Ok(None)),
             Uncertainty::Declared => {
                 deviating(&system, &mut models, &file.vary).map_err(|e| e.in_file(path))?
             }
@@ -413,11 +417,26 @@ impl Campaign {
         let late = coupling::delays(&system, &refer, &connected);
         let mut notes = coupling::unit_notes(&system, &refer, &connected);
         notes.extend(late.warnings.into_iter().chain(late.notes));
+        let (steps, kept) = steps.map_or_else(|why| (None, Some(why)), |steps| (steps, None));
+        notes.extend(kept);
         notes.extend(declared.iter().map(|declared| {
             let [filter, plant] = [declared.filter, declared.plant].map(|c| &system.components()[c].name);
             format!("{plant} is the model of {filter} and deviates from it in each run, as drawn within what {filter} declares")
         }));
-        Ok(Self { source, system, models, varied, sampling, sampler, seed, runs, success, declared, notes })
+        Ok(Self {
+            source,
+            system,
+            models,
+            varied,
+            sampling,
+            sampler,
+            seed,
+            runs,
+            success,
+            declared,
+            steps,
+            notes,
+        })
     }
 
     /// The texts it is made of.
@@ -591,6 +610,18 @@ impl Campaign {
         for (varied, value) in self.varied.iter().zip(&choice.values) {
             simulation.set_start(varied.component, varied.reference, *value);
         }
+        // Steps are drawn as the first plant is.
+        let drawn = |name: &str| {
+            let plant = &self.system.components()[self.declared.first()?.plant].name;
+            let at = self.varied.iter().position(|varied| varied.name == format!("{plant}.{name}"))?;
+            choice.values.get(at).copied()
+        };
+        let of_run = drawn(Deviation::SEED).zip(drawn(Deviation::KIND));
+        simulation.set_steps(self.steps.zip(of_run).map(|(steps, (seed, kind))| DrawnSteps {
+            seed,
+            kind,
+            ..steps
+        }));
         let pieces: Vec<f64> = choice.pieces.iter().map(|seed| *seed as f64).collect();
         let sequence = |varied: &Varied| {
             let (values, steps) = match &varied.distribution {
@@ -630,15 +661,17 @@ fn deviating(
     system: &System,
     models: &mut [Part],
     vary: &BTreeMap<String, VarySection>,
-) -> Result<Vec<Declared>, Error> {
-    let found = {
+) -> Result<(Vec<Declared>, coupling::Steps), Error> {
+    let (found, steps) = {
         let configurations: Vec<_> = models.iter().map(Part::configuration).collect();
         let descriptions: Vec<_> = models.iter().map(Part::description).collect();
-        coupling::deviations(system, &descriptions, &configurations)
-            .map_err(|message| Error::configuration("campaign.uncertainty", message))?
+        let found = coupling::deviations(system, &descriptions, &configurations)
+            .map_err(|message| Error::configuration("campaign.uncertainty", message))?;
+        let steps = coupling::steps(system, &descriptions, &configurations, &found);
+        (found, steps)
     };
     let mut declared = Vec::new();
-    for coupling::Drawn { filter, plant, configuration, late, delayed } in found {
+    for coupling::Drawn { filter, plant, configuration, late, delayed, .. } in found {
         for (component, role) in [(filter, Role::Filter), (plant, Role::Plant)] {
             let name = &system.components()[component].name;
             let is_fixed = |key: &&String| {
@@ -654,7 +687,7 @@ fn deviating(
         models[plant] = Part::Own(Box::new(coupling::Own::new(Configuration::Plant(configuration))?));
         declared.push(Declared { filter, plant, late, delayed });
     }
-    Ok(declared)
+    Ok((declared, steps))
 }
 
 /// The error for a name under `vary` that has dots but no quotes, which TOML reads as nested tables.

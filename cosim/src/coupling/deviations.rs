@@ -1,8 +1,9 @@
 //! Plants that deviate from the model of their filter, as it declares: which one is whose, and whether it can.
 
-use punctual_fmu::configuration::{Configuration, Deviation, PlantConfiguration};
+use punctual_fmu::configuration::{Configuration, Deviation, DeviationKind, PlantConfiguration};
 
 use super::delays::{self, Late};
+use super::master::DrawnSteps;
 use super::model::{Model, Own};
 use super::network;
 use super::promises::is_of;
@@ -22,6 +23,54 @@ pub struct Drawn {
     pub late: bool,
     /// Whether the input of a sample acts later than that sample.
     pub delayed: bool,
+    /// That delay in s.
+    pub delay: f64,
+}
+
+/// How steps are drawn, if a filter declares that their lengths vary; or in words why they are not.
+pub type Steps = Result<Option<DrawnSteps>, String>;
+
+/// The length of the shortest step that is drawn, as a part of the usual one. A filter that declares how late one may come allows any.
+const SHORTEST: f64 = 0.2;
+
+/// How the lengths of steps are drawn, for steps whose lengths filters declare; seed and kind are those of a run. `None` if none does.
+///
+/// # Errors
+///
+/// In words: why steps keep their length though a filter declares that they vary.
+pub fn steps(
+    system: &System,
+    descriptions: &[&Description],
+    configurations: &[Option<&Configuration>],
+    found: &[Drawn],
+) -> Steps {
+    let filters = configurations.iter().enumerate().filter_map(|(c, configuration)| match configuration {
+        Some(Configuration::Filter(filter)) => Some((&system.components()[c].name, filter)),
+        _ => None,
+    });
+    let jitters: Vec<_> = filters.map(|(name, filter)| (name, filter.jitter())).collect();
+    if jitters.iter().all(|(_, jitter)| *jitter == 0.0) {
+        return Ok(None);
+    }
+    let keep = |why: String| Err(format!("steps are all of one length, so that no `jitter` is drawn: {why}"));
+    if let Some((name, _)) = jitters.iter().find(|(_, jitter)| *jitter == 0.0) {
+        return keep(format!("{name} declares none"));
+    }
+    if let Some(drawn) = found.iter().find(|drawn| drawn.late) {
+        let name = &system.components()[drawn.filter].name;
+        return keep(format!(
+            "in this order the input of {name} acts a step late, and with it for another time"
+        ));
+    }
+    if let Some(c) = descriptions.iter().position(|description| !description.any_step) {
+        let name = &system.components()[c].name;
+        return keep(format!("the FMU of {name} does not say that it can handle steps of different length"));
+    }
+    // Two inputs of a filter must not be on their way at once.
+    let delays = found.iter().map(|drawn| drawn.delay / system.experiment().step);
+    let least = delays.fold(SHORTEST, f64::max);
+    let jitter = jitters.iter().map(|(_, jitter)| *jitter).fold(f64::INFINITY, f64::min);
+    Ok(Some(DrawnSteps { seed: 0.0, kind: 0.0, jitter, least: least.min(1.0) }))
 }
 
 /// What a component is to another one.
@@ -52,25 +101,28 @@ pub fn as_the_model(configuration: &mut Configuration) {
     }
 }
 
-/// Lets the plants of `system` deviate at the ends of what their filters declare, as drawn by `seed`.
+/// Lets the plants of `system` deviate at the ends of what their filters declare, as drawn by `seed`. Returns how the steps are drawn, or in
+/// words why they are not.
 ///
 /// # Errors
 ///
 /// As for [`deviations`], in the words of the option `field`.
-pub fn draw(system: &System, models: &mut [Model], seed: u64, field: &str) -> Result<(), Error> {
+pub fn draw(system: &System, models: &mut [Model], seed: u64, field: &str) -> Result<Steps, Error> {
     let descriptions: Vec<_> = models.iter().map(Model::description).collect();
     let configurations: Vec<_> = models.iter().map(Model::configuration).collect();
     let found = deviations(system, &descriptions, &configurations);
-    for Drawn { plant, mut configuration, .. } in
-        found.map_err(|message| Error::configuration(field, message))?
-    {
+    let found = found.map_err(|message| Error::configuration(field, message))?;
+    let kind = f64::from(DeviationKind::Corners as u8);
+    let drawn = steps(system, &descriptions, &configurations, &found);
+    let drawn = drawn.map(|drawn| drawn.map(|drawn| DrawnSteps { seed: seed as f64, kind, ..drawn }));
+    for Drawn { plant, mut configuration, .. } in found {
         if let Some(deviation) = &mut configuration.deviation {
             deviation.seed = seed as f64;
         }
         let path = models[plant].path().to_owned();
         models[plant] = Model::Own(Box::new(Own::new(Configuration::Plant(configuration))?), path);
     }
-    Ok(())
+    Ok(drawn)
 }
 
 /// The plants of all filters of `system` that declare something. `configurations` are those of the components that have one.
@@ -162,6 +214,7 @@ pub fn deviations(
             configuration: plant.clone().deviating(Deviation::of(&filter, step, acts)),
             late: acts > 0.0,
             delayed: filter.actuation_delay > 0.0,
+            delay: filter.actuation_delay,
         });
     }
     if found.is_empty() {

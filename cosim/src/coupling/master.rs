@@ -1,4 +1,4 @@
-//! The fixed-step master.
+//! The master: its steps have one length, or [drawn](DrawnSteps) ones.
 //!
 //! At each communication point t_k, Gauss–Seidel order:
 //!
@@ -19,7 +19,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use punctual_fmu::configuration::Configuration;
+use punctual_fmu::configuration::{Configuration, Deviation};
 use punctual_fmu::text::number;
 
 use super::delays;
@@ -148,6 +148,30 @@ pub struct Sequence {
     pub steps: u64,
     /// The values. The first is the start value; the last stays until the end.
     pub values: Vec<f64>,
+}
+
+/// Steps of a run whose lengths are drawn, as late and as early as a filter declares.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DrawnSteps {
+    /// The seed of what is drawn, a whole number.
+    pub seed: f64,
+    /// The number of a [`DeviationKind`](punctual_fmu::configuration::DeviationKind).
+    pub kind: f64,
+    /// The part of a step by which one may be longer.
+    pub jitter: f64,
+    /// The length of the shortest, as a part of the usual one, > 0.
+    pub least: f64,
+}
+
+impl DrawnSteps {
+    /// The length of step `k`, as a part of the usual one. The first is as usual, since a filter makes its first plan for steps like it.
+    fn length(&self, k: u64) -> f64 {
+        if k == 0 {
+            return 1.0;
+        }
+        let late = Deviation::lateness(self.seed, self.kind, k);
+        1.0 + if late > 0.0 { self.jitter * late } else { (1.0 - self.least) * late }
+    }
 }
 
 /// Result of a run.
@@ -376,6 +400,19 @@ impl<P: Participant> Simulation<P> {
         self.sequences = sequences;
     }
 
+    /// Draws the lengths of the steps from the next run on; without, all are as long as the system says.
+    pub fn set_steps(&mut self, drawn: Option<DrawnSteps>) {
+        let grid = Grid::new(self.start_time, self.stop_time, self.grid.usual());
+        self.grid = drawn.map_or_else(|| grid.clone(), |drawn| grid.drawn(|k| drawn.length(k)));
+    }
+
+    /// Adds a note to those of every run.
+    pub fn note(&mut self, note: String) {
+        self.notes.truncate(self.standing_notes);
+        self.notes.push(note);
+        self.standing_notes = self.notes.len();
+    }
+
     /// Sets the values of the sequences that begin at point `k`.
     fn change(&mut self, k: u64) -> Result<(), Error> {
         for Sequence { component, reference, steps, values } in &self.sequences {
@@ -562,7 +599,7 @@ impl<P: Participant> Simulation<P> {
             let deadline = watched.deadline.map(|(reference, own)| {
                 starts.iter().find_map(|start| start.number(reference)).unwrap_or(own)
             });
-            self.notes.extend(watched.reset(deadline, self.grid.step(0)));
+            self.notes.extend(watched.reset(deadline, self.grid.usual()));
         }
         self.interference.iter_mut().for_each(interference::Watched::reset);
         // Set start values, and enter initialization mode.

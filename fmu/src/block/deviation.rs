@@ -19,6 +19,7 @@ enum Of {
     Gain = 12,
     Lag = 13,
     Error = 14,
+    Step = 15,
 }
 
 /// What is drawn once for each sequence.
@@ -167,35 +168,45 @@ impl Deviating {
 
     /// Where in what is declared the signal `i` is at time `t` (s), −1 to 1.
     fn drawn(&self, of: Of, i: usize, t: f64) -> f64 {
-        let (kind, step) = (self.of.kind, self.of.step);
-        let number = |facet: Facet, interval: f64| {
-            let signal = (of as u64) << 32 | i as u64;
-            uniform([self.of.seed.to_bits(), signal, facet as u64, interval.to_bits()])
-        };
-        if kind == f64::from(DeviationKind::Constant as u8) {
-            return number(Facet::Value, 0.0);
+        drawn((self.of.seed, self.of.kind, self.of.step), (of, i), t)
+    }
+}
+
+impl Deviation {
+    /// How late step `k` of a run is within what is declared, as `seed` and `kind` draw it: 1 as late as it may be, −1 as early.
+    pub fn lateness(seed: f64, kind: f64, k: u64) -> f64 {
+        drawn((seed, kind, 1.0), (Of::Step, 0), k as f64)
+    }
+}
+
+/// Where in what is declared a signal is at time `t` (s), −1 to 1, for a seed, a kind and a step (s).
+fn drawn((seed, kind, step): (f64, f64, f64), (of, i): (Of, usize), t: f64) -> f64 {
+    let number = |facet: Facet, interval: f64| {
+        let signal = (of as u64) << 32 | i as u64;
+        uniform([seed.to_bits(), signal, facet as u64, interval.to_bits()])
+    };
+    if kind == f64::from(DeviationKind::Constant as u8) {
+        return number(Facet::Value, 0.0);
+    }
+    // The time that a value lasts, between a step and the longest, any order of magnitude alike.
+    let part = 0.5 * (number(Facet::Period, 0.0) + 1.0);
+    let lasts = step * elementary::powf(LONGEST, part);
+    let way = number(Facet::Way, 0.0);
+    let interval = |lasts: f64| (t / lasts + ROUND_OFF).floor();
+    if kind == f64::from(DeviationKind::Changing as u8) {
+        return number(Facet::Value, interval(lasts));
+    }
+    let sign = |value: f64| if value < 0.0 { -1.0 } else { 1.0 };
+    match way {
+        // Always at the same end.
+        way if way < -0.4 => sign(number(Facet::Value, 0.0)),
+        // In turn; the half of these from one sample to the next.
+        way if way < 0.4 => {
+            let lasts = if way < 0.0 { step } else { lasts };
+            sign(number(Facet::Value, 0.0)) * if interval(lasts).rem_euclid(2.0) < 1.0 { 1.0 } else { -1.0 }
         }
-        // The time that a value lasts, between a step and the longest, any order of magnitude alike.
-        let part = 0.5 * (number(Facet::Period, 0.0) + 1.0);
-        let lasts = step * elementary::powf(LONGEST, part);
-        let way = number(Facet::Way, 0.0);
-        let interval = |lasts: f64| (t / lasts + ROUND_OFF).floor();
-        if kind == f64::from(DeviationKind::Changing as u8) {
-            return number(Facet::Value, interval(lasts));
-        }
-        let sign = |value: f64| if value < 0.0 { -1.0 } else { 1.0 };
-        match way {
-            // Always at the same end.
-            way if way < -0.4 => sign(number(Facet::Value, 0.0)),
-            // In turn; the half of these from one sample to the next.
-            way if way < 0.4 => {
-                let lasts = if way < 0.0 { step } else { lasts };
-                sign(number(Facet::Value, 0.0))
-                    * if interval(lasts).rem_euclid(2.0) < 1.0 { 1.0 } else { -1.0 }
-            }
-            // By chance.
-            _ => sign(number(Facet::Value, interval(lasts))),
-        }
+        // By chance.
+        _ => sign(number(Facet::Value, interval(lasts))),
     }
 }
 

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use super::controller::ControllerKind;
 use super::plant::PlantKind;
 use super::{
-    ConfigurationError, Controller, ControllerConfiguration, DisturbanceSection, FilterConfiguration,
-    IntegrationSection, ModelName, PlantConfiguration, PlantSection,
+    ConfigurationError, Controller, ControllerConfiguration, Deviation, DisturbanceSection,
+    FilterConfiguration, IntegrationSection, ModelName, PlantConfiguration, PlantSection,
 };
 
 /// What a run of a filter's file alone has besides the filter.
@@ -33,6 +33,7 @@ impl FilterConfiguration {
     /// only the inputs are known.
     pub fn alone(&self) -> Result<(PlantConfiguration, Option<ControllerConfiguration>), ConfigurationError> {
         let RunSection { x0, u_ref, simulated, integration, disturbance } = (*self.run).clone();
+        let is_model = simulated.is_none() && self.integrator.is_none();
         let plant = simulated.map_or_else(|| self.outside(), Ok)?;
         let controller = u_ref.map(|u_ref| {
             let controller = ControllerConfiguration {
@@ -46,7 +47,9 @@ impl FilterConfiguration {
             controller.functions::<f64>().map(|_| controller)
         });
         let (kind, name, experiment) = (PlantKind::Plant, "plant".to_owned(), self.experiment);
-        let (output, deviation) = (Vec::new(), None);
+        let is_late = is_model && self.actuation_delay > 0.0;
+        let deviation = is_late.then(|| Box::new(Deviation::late(self, experiment.step_size)));
+        let output = Vec::new();
         let plant = PlantConfiguration {
             kind,
             name,

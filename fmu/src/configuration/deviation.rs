@@ -2,6 +2,8 @@
 //!
 //! It is for tests of a promise. No file has it and no FMU: a campaign or a run puts it into the plant that it simulates.
 
+use std::collections::BTreeMap;
+
 use super::{FilterConfiguration, PlantConfiguration, UncertaintySection};
 
 /// How the deviations of a plant change with time; the number is that of the parameter [`Deviation::KIND`].
@@ -48,6 +50,13 @@ impl Deviation {
     pub const SEED: &str = "uncertainty.seed";
     /// The parameter of the plant with the number of the kind.
     pub const KIND: &str = "uncertainty.kind";
+
+    /// The delay that `filter` declares alone, with samples `step` s apart.
+    pub fn late(filter: &FilterConfiguration, step: f64) -> Self {
+        let mut exact = filter.clone();
+        (exact.uncertainty, exact.measurement_errors) = (None, BTreeMap::new());
+        Self::of(&exact, step, 0.0)
+    }
 
     /// What `filter` declares, with samples `step` s apart, in a coupling that hands an input on `late` s after its sample.
     pub fn of(filter: &FilterConfiguration, step: f64, late: f64) -> Self {

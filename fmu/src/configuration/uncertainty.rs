@@ -225,6 +225,11 @@ impl FilterConfiguration {
         errors.into_iter().chain(uncertainty).collect::<Vec<_>>().join(" and ")
     }
 
+    /// The part of a step by which the next one may come late, as it is declared.
+    pub fn jitter(&self) -> f64 {
+        self.uncertainty.as_deref().map_or(0.0, |declared| declared.jitter)
+    }
+
     /// For which plants plans keep the promises: rates, measurement errors, gains, lags, a delay and late steps, in words. Empty if for the model alone.
     pub fn covered(&self) -> Vec<String> {
         let none = UncertaintySection::default();
