@@ -9,6 +9,7 @@
 //! page                 a page of HTML with charts
 //! drawing              from a system file's plots and a recording to pictures
 //! report               a run as a page, with an animation; a campaign as a page
+//! tube                 where a plan for an uncertain plant may be
 //! ```
 #![forbid(unsafe_code)]
 // Elementary functions come from the core: see clippy.toml.
@@ -20,3 +21,4 @@ pub mod outlines;
 pub mod page;
 pub mod plot;
 pub mod report;
+pub mod tube;

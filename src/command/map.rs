@@ -6,11 +6,12 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use punctual_core::filter::{Filter, Planning};
-use punctual_core::plan::{BackupPlan, Failure, Tracking};
+use punctual_core::plan::{BackupPlan, Failure};
 use punctual_cosim::error::Error;
 use punctual_cosim::whole;
 use punctual_fmu::configuration::{FilterConfiguration, Shape};
-use punctual_pictures::plot::{self, Band, Disc, MapPlot, Mark, PathPlot, Series, Style, TimePlot};
+use punctual_pictures::plot::{self, Disc, MapPlot, Mark, PathPlot, Series, Style, TimePlot};
+use punctual_pictures::tube::PlanTube;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -174,7 +175,7 @@ pub(super) fn plan(
         filter.barrier_values(*t, x, h).map_err(Error::from)?;
     }
     let promised: Vec<bool> = filter.planning().map_or(Vec::new(), |own| own.promised(t, x0).collect());
-    let tube = plan.tracking().map(|tracking| Tube::new(c, tracking));
+    let tube = plan.tracking().map(|tracking| PlanTube::new(c, tracking));
     let mut panels = Vec::new();
     for (i, barrier) in c.barrier.iter().enumerate() {
         let is_promised = promised.get(i).copied().unwrap_or(false);
@@ -236,124 +237,13 @@ pub(super) fn plan(
             y_label: label(1),
             paths: vec![path],
             discs: discs(c),
-            tubes: tube.iter().map(Tube::around_path).collect(),
+            tubes: tube.iter().map(PlanTube::around_path).collect(),
             ..PathPlot::default()
         };
         plot::path(&picture, &files[1])?;
     }
     Ok(files.iter().map(shown).collect())
 }
-
-/// The name of a tube in a legend.
-const TUBE: &str = "tube";
-
-/// The numbers of the holds that are drawn, out of `count`, with the last.
-fn thinned(count: usize) -> Vec<usize> {
-    let every = (count as f64 / POINTS).ceil().max(1.0) as usize;
-    (0..count).filter(|k| k % every == 0 || k + 1 == count).collect()
-}
-
-/// The tube of a plan, as boxes around the reference at every sample.
-struct Tube<'a> {
-    tracking: &'a Tracking,
-    /// The samples that are drawn.
-    times: Vec<usize>,
-    /// How far the plant may be from the reference at every sample, by state.
-    halves: Vec<Vec<f64>>,
-}
-
-impl<'a> Tube<'a> {
-    fn new(c: &FilterConfiguration, tracking: &'a Tracking) -> Self {
-        let error = |name: &str| c.measurement_errors.get(name).copied().unwrap_or(0.0);
-        let errors: Vec<f64> = c.plant.states().iter().map(|state| error(&state.name)).collect();
-        // The radii are those of measurements, each of which adds an error of its own to the state. The first one is the reference,
-        // and the state is within its error.
-        let half = |(k, radii): (usize, &Vec<f64>)| {
-            let by = |(radius, error): (&f64, &f64)| if k == 0 { *radius } else { (radius - error).max(0.0) };
-            radii.iter().zip(&errors).map(by).collect()
-        };
-        let halves = tracking.radii().iter().enumerate().map(half).collect();
-        Self { tracking, times: thinned(tracking.inputs().len()), halves }
-    }
-
-    fn time(&self) -> Vec<f64> {
-        self.times.iter().map(|k| self.tracking.times()[*k]).collect()
-    }
-
-    /// The tube around the path of the first two states.
-    fn around_path(&self) -> plot::Tube {
-        let of = |rows: &[Vec<f64>]| self.times.iter().map(|k| [rows[*k][0], rows[*k][1]]).collect();
-        let middles = of(self.tracking.states());
-        plot::Tube { label: TUBE.to_owned(), middles, halves: of(&self.halves), colour: 0 }
-    }
-
-    /// The inputs of the law in the tube: what it adds to the reference is |K| times the radii at most, and it was checked that
-    /// it stays within the limits.
-    fn around_input(&self, input: usize, [min, max]: [f64; 2]) -> Band {
-        let reach = |k: usize| {
-            let radii = &self.tracking.radii()[k];
-            let row = self.tracking.gains()[k].chunks_exact(radii.len()).nth(input).unwrap_or_default();
-            row.iter().zip(radii).map(|(gain, radius)| gain.abs() * radius).sum::<f64>()
-        };
-        let end = |side: f64| {
-            let value = |k: &usize| self.tracking.inputs()[*k][input] + side * reach(*k);
-            // Not `clamp`, which panics if the limits contradict each other.
-            self.times.iter().map(|k| value(k).max(min).min(max)).collect()
-        };
-        let (low, high) = (end(-1.0), end(1.0));
-        Band { label: TUBE.to_owned(), time: self.time(), low, high, steps: true, colour: 0 }
-    }
-
-    /// h of a barrier in the tube. Along a box, h lies between its values at the corners where it bends down, and above its
-    /// tangent where it bends up; the other way round for the upper end. From `required` on it was checked that h ≥ 0.
-    fn around_h(&self, filter: &Filter, barrier: usize, required: f64) -> Result<Band, Error> {
-        let count = filter.barrier_names().count();
-        let (mut low, mut high) = (Vec::new(), Vec::new());
-        for &k in &self.times {
-            let (time, z, radii) = (self.tracking.times()[k], &self.tracking.states()[k], &self.halves[k]);
-            let mut values = vec![0.0; count];
-            let mut h = |x: &[f64]| -> Result<f64, Error> {
-                filter.barrier_values(time, x, &mut values).map_err(Error::from)?;
-                Ok(values[barrier])
-            };
-            let middle = h(z)?;
-            // The tangent, by differences over a small part of the box.
-            let (mut x, mut along, mut moving) = (z.clone(), 0.0, Vec::new());
-            for i in 0..z.len() {
-                let by = radii[i] * PART;
-                let [more, less] = [by, -by].map(|by| {
-                    x[i] = z[i] + by;
-                    h(&x)
-                });
-                x[i] = z[i];
-                let slope = (more? - less?).abs() / (2.0 * PART);
-                if slope > 0.0 {
-                    along += slope;
-                    moving.push(i);
-                }
-            }
-            // With so many states the corners would take too long; the tangent is close.
-            moving.truncate(MOST_STATES);
-            let (mut least, mut most) = (middle - along, middle + along);
-            for corner in 0..1_usize << moving.len() {
-                for (bit, i) in moving.iter().enumerate() {
-                    x[*i] = z[*i] + if corner >> bit & 1 == 0 { -radii[*i] } else { radii[*i] };
-                }
-                let h = h(&x)?;
-                (least, most) = (least.min(h), most.max(h));
-            }
-            let is_required = time >= required;
-            low.push(if is_required { least.max(0.0).min(middle) } else { least });
-            high.push(most);
-        }
-        Ok(Band { label: TUBE.to_owned(), time: self.time(), low, high, steps: false, colour: 0 })
-    }
-}
-
-/// The part of a box over which h is differentiated.
-const PART: f64 = 1e-3;
-/// The most states whose corners are tried.
-const MOST_STATES: usize = 8;
 
 /// The discs among the sets.
 fn discs(c: &FilterConfiguration) -> Vec<Disc> {

@@ -20,7 +20,8 @@ use punctual_cosim::text;
 use punctual_cosim::whole;
 use punctual_fmu::configuration::{Configuration, FileKind, FilterConfiguration};
 use punctual_pictures::drawing::{self, Drawing};
-use punctual_pictures::report;
+use punctual_pictures::report::{self, FirstTube};
+use punctual_pictures::tube::PlanTube;
 use serde::Serialize;
 
 use super::{check, identify};
@@ -306,7 +307,8 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
         if arguments.report {
             let page = folder.join(format!("{}.html", stem(path)));
             let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-            let text = report::document(&name, &system, &models, &outcome, &notes);
+            let tubes = first_tubes(&system, &models, &outcome);
+            let text = report::document(&name, (&system, &models), &outcome, &tubes, &notes);
             whole::write(&page, text)?;
             files.push(page.display().to_string());
         }
@@ -331,6 +333,54 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
         output::note(&format!("note: --require {} is not met by {}", required.word(), missed.join(", ")));
     }
     Ok(ExitCode::from(codes::FOUND))
+}
+
+/// The tubes of the first plans of all filters that declare how their plants may differ.
+fn first_tubes(system: &System, models: &[Model], outcome: &Outcome) -> Vec<FirstTube> {
+    let parts = drawing::parts(system, models);
+    let jacobi = system.experiment().order == Order::Jacobi;
+    let tube = |part: &drawing::Part<'_>| -> Option<FirstTube> {
+        let mut c = part.filter()?;
+        if !c.is_assured() || c.covered().is_empty() || c.arm_after > 0.0 {
+            return None;
+        }
+        if jacobi && c.actuation_delay == 0.0 {
+            c.actuation_delay = system.experiment().step;
+        }
+        let recording = &outcome.recording;
+        let first = |name: String| {
+            let index = recording.index_of(&part.signal(&name))?;
+            recording.column(index).next()
+        };
+        let measured: Vec<f64> =
+            c.measured_states().iter().map(|s| first(format!("x.{}", s.name))).collect::<Option<_>>()?;
+        let filter = c.assured(c.build().ok()?).ok()?;
+        let time = *recording.times().first()?;
+        let plan = filter.planning()?.plan_from(time, &measured, 1.0).ok()?;
+        let tube = PlanTube::new(&c, plan.tracking()?);
+        let promised: Vec<bool> = filter.planning()?.promised(time, &measured).collect();
+        let h = c.barrier.iter().enumerate().filter_map(|(i, barrier)| {
+            let is_promised = promised.get(i).copied().unwrap_or(false);
+            let required = if is_promised { time + barrier.deadline.unwrap_or(0.0) } else { f64::INFINITY };
+            Some((barrier.name.clone(), tube.around_h(&filter, i, required).ok()?))
+        });
+        let inputs = c.plant.inputs().into_iter().enumerate();
+        let limits = |name: &str| c.bounds.get(name).copied().unwrap_or_default();
+        let states = c.plant.states();
+        let is_plane = states.len() >= 2 && states[0].unit == "m" && states[1].unit == "m";
+        Some(FirstTube {
+            component: part.component.name.clone(),
+            path: is_plane.then(|| tube.around_path()),
+            h: h.collect(),
+            inputs: inputs
+                .map(|(i, input)| {
+                    let band = tube.around_input(i, limits(&input.name));
+                    (input.name, band)
+                })
+                .collect(),
+        })
+    };
+    parts.iter().filter_map(tube).collect()
 }
 
 /// Whether the filter of a single-file run refused its promise at the first sample.

@@ -72,6 +72,14 @@ pub struct Tube {
     pub colour: usize,
 }
 
+impl Tube {
+    /// Its outlines in the units of the axes, all in the same direction, which together bound it.
+    pub fn rings(&self) -> Vec<Vec<[f64; 2]>> {
+        let rings = path::around(self, |x, y| (x, y)).into_iter();
+        rings.map(|ring| ring.into_iter().map(|(x, y)| [x, y]).collect()).collect()
+    }
+}
+
 /// A path: a start marker, a line, and a marker where it arrives.
 #[derive(Clone, Debug, Default)]
 pub struct Path {
@@ -182,6 +190,25 @@ pub struct Band {
     pub steps: bool,
     /// Index into [`PALETTE`]: that of the signal around which it lies.
     pub colour: usize,
+}
+
+impl Band {
+    /// Its outline in the units of the axes.
+    pub fn ring(&self) -> Vec<[f64; 2]> {
+        let side = |values: &[f64]| -> Vec<[f64; 2]> {
+            let mut points = Vec::new();
+            for (k, (time, value)) in self.time.iter().zip(values).enumerate() {
+                points.push([*time, *value]);
+                if let Some(next) = self.time.get(k + 1).filter(|_| self.steps) {
+                    points.push([*next, *value]);
+                }
+            }
+            points
+        };
+        let (mut ring, high) = (side(&self.low), side(&self.high));
+        ring.extend(high.into_iter().rev());
+        ring
+    }
 }
 
 /// Styles of a line. Styles without a line are only for charts.

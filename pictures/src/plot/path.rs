@@ -39,7 +39,7 @@ pub(super) fn draw(plot: &PathPlot, canvas: &mut Canvas) -> Result<(), String> {
     }
     axes.sets(canvas, &plot.discs, &plot.outlines);
     for tube in &plot.tubes {
-        let rings = around(tube, &axes);
+        let rings = around(tube, |x, y| axes.place(x, y));
         canvas.clipped(area, |canvas| canvas.union(&rings, colour(tube.colour), TUBE));
     }
     // What has to be kept out of covers the corners of boxes that reach into it: the tube itself does not.
@@ -68,8 +68,8 @@ pub(super) fn draw(plot: &PathPlot, canvas: &mut Canvas) -> Result<(), String> {
 /// The most boxes of a tube that are drawn.
 const BOXES: usize = 300;
 
-/// The outlines of a tube on the sheet: for each two boxes, one after the other, the least convex area that holds both.
-fn around(tube: &Tube, axes: &Axes) -> Vec<Vec<Point>> {
+/// The outlines of a tube, with its points at `place`: for each two boxes, one after the other, the least convex area that holds both.
+pub(super) fn around(tube: &Tube, place: impl Fn(f64, f64) -> Point) -> Vec<Vec<Point>> {
     let boxes: Vec<_> = tube.middles.iter().zip(&tube.halves).collect();
     let every = boxes.len().div_ceil(BOXES).max(1);
     // A box that is left out lies between those around it, up to what a path bends over so few steps.
@@ -77,7 +77,7 @@ fn around(tube: &Tube, axes: &Axes) -> Vec<Vec<Point>> {
     let corners = |k: usize| {
         let (middle, half) = boxes[k];
         [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
-            .map(|[x, y]| axes.place(middle[0] + x * half[0], middle[1] + y * half[1]))
+            .map(|[x, y]| place(middle[0] + x * half[0], middle[1] + y * half[1]))
     };
     let kept: Vec<_> = kept
         .map(corners)
@@ -186,7 +186,7 @@ mod tests {
             (0..1000).map(|k| [0.01 * f64::from(k), 0.00001 * f64::from(k * k)]).collect();
         let halves = vec![[0.3, 0.2]; middles.len()];
         let tube = Tube { label: "tube".into(), middles, halves, colour: 0 };
-        let rings = around(&tube, &axes);
+        let rings = around(&tube, |x, y| axes.place(x, y));
         assert!(rings.len() <= BOXES + 1, "{}", rings.len());
         // Twice the signed area: all alike, so that they add up to one area.
         let size = |ring: &Vec<Point>| -> f64 {

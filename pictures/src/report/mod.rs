@@ -14,7 +14,7 @@ use serde::Serialize;
 use crate::drawing::{self, Group, Part};
 use crate::page::{Page, escape, json};
 use crate::plot::{self, Chart, Curve, Mark, POINTS, Scaling, Style};
-use scene::{Outline, Strip, Vehicle};
+use scene::{Area, Outline, Strip, Vehicle};
 
 const SCRIPT: &str = include_str!("run.js");
 const STYLE: &str = include_str!("run.css");
@@ -31,17 +31,35 @@ struct Scene {
     outlines: Vec<Outline>,
     /// The status of each filter, with the key of its place in the page.
     strips: Vec<(String, Strip)>,
+    /// What lies beneath the curves of a chart, with its key.
+    areas: Vec<(String, Vec<Area>)>,
     /// Barriers without an outline, because they read more than the position.
     #[serde(skip)]
     left_out: Vec<String>,
 }
 
-/// The page of a run of `system`, which is in `file`. Its components are made from `models`.
+/// The tube of the first plan of a filter.
+#[derive(Default)]
+pub struct FirstTube {
+    /// The name of the filter.
+    pub component: String,
+    /// Around the path, if there is a plane.
+    pub path: Option<plot::Tube>,
+    /// Around h of each barrier, by name.
+    pub h: Vec<(String, plot::Band)>,
+    /// Around each input, by name.
+    pub inputs: Vec<(String, plot::Band)>,
+}
+
+/// A chart over time, and the parts of tubes beneath its curves.
+type Layers = (Chart, Vec<Area>);
+
+/// The page of a run of `system`, which is in `file`. Its components are made from `models`; `tubes` are those of their first plans.
 pub fn document(
     file: &str,
-    system: &System,
-    models: &[Model],
+    (system, models): (&System, &[Model]),
     outcome: &Outcome,
+    tubes: &[FirstTube],
     notes: &[String],
 ) -> String {
     let recording = &outcome.recording;
@@ -55,10 +73,13 @@ pub fn document(
     if let Some(chart) = plane(&parts, outcome, &mut scene) {
         let arrival = chart.curves.iter().any(|curve| curve.ends[1].is_some());
         let arrival = if arrival { " Diamond: arrival." } else { "" };
+        let around = |(i, tube): (usize, &FirstTube)| Some(Area::new(tube.path.as_ref()?.rings(), i));
+        let around_paths: Vec<Area> = tubes.iter().enumerate().filter_map(around).collect();
+        let tube = if around_paths.is_empty() { "" } else { SHADED };
         let _ = writeln!(
             drawn,
             "<h2>Path</h2>\n<div class=\"chart plane\" data-chart=\"path\"></div>\n\
-             <p class=\"hint\">Circle: start.{arrival} Green: to be inside. Red: to stay out.{}</p>",
+             <p class=\"hint\">Circle: start.{arrival} Green: to be inside. Red: to stay out.{tube}{}</p>",
             match &scene.left_out[..] {
                 [] => String::new(),
                 names => format!(
@@ -68,6 +89,7 @@ pub fn document(
             }
         );
         charts.push(("path".to_owned(), chart));
+        scene.areas.push(("path".to_owned(), around_paths));
     }
     for (f, part) in filters.iter().enumerate() {
         let title = if filters.len() > 1 { &part.component.name } else { "Over time" };
@@ -77,9 +99,15 @@ pub fn document(
             let _ = writeln!(drawn, "<div class=\"strip\" data-strip=\"{key}\"></div>");
             scene.strips.push((key, strip));
         }
-        let over_time = barriers(&parts, part, outcome).into_iter().chain(inputs(&parts, part, outcome));
-        for (c, chart) in over_time.enumerate() {
+        let tube = tubes.iter().find(|tube| tube.component == part.component.name);
+        if tube.is_some() {
+            let _ = writeln!(drawn, "<p class=\"hint\">{SHADED}</p>");
+        }
+        let over_time =
+            barriers(&parts, part, outcome, tube).into_iter().chain(inputs(&parts, part, outcome, tube));
+        for (c, (chart, areas)) in over_time.enumerate() {
             let key = format!("chart-{f}-{c}");
+            scene.areas.push((key.clone(), areas));
             let _ = writeln!(drawn, "<div class=\"chart over-time\" data-chart=\"{key}\"></div>");
             charts.push((key, chart));
         }
@@ -96,6 +124,9 @@ pub fn document(
     let title = format!("{file}: run");
     Page { title: &title, body: &body, charts, style: STYLE, script: &script }.document()
 }
+
+/// The meaning of a tube.
+const SHADED: &str = " Shaded: the tube of the first plan, in which its law keeps every plant that was declared. Where the run is outside, it had another plan.";
 
 /// Instructions for the reader.
 const HINT: &str = "<p class=\"hint\">Play the run below, or click into a chart over time to go there. Point at a curve to read \
@@ -325,7 +356,7 @@ fn time_axis(outcome: &Outcome) -> Scaling {
 }
 
 /// h of each barrier with its profile, a chart for each unit.
-fn barriers(parts: &[Part<'_>], part: &Part<'_>, outcome: &Outcome) -> Vec<Chart> {
+fn barriers(parts: &[Part<'_>], part: &Part<'_>, outcome: &Outcome, tube: Option<&FirstTube>) -> Vec<Layers> {
     let mut colour = 0;
     let chart = |Group { unit, barriers, .. }: Group| {
         let mut chart = Chart {
@@ -335,6 +366,7 @@ fn barriers(parts: &[Part<'_>], part: &Part<'_>, outcome: &Outcome) -> Vec<Chart
             horizontals: vec![Mark { label: String::new(), at: 0.0 }],
             ..Chart::default()
         };
+        let mut areas: Vec<Area> = Vec::new();
         for barrier in &barriers {
             let signal = |field: &str| part.signal(&format!("{barrier}.{field}"));
             let recording = &outcome.recording;
@@ -344,6 +376,8 @@ fn barriers(parts: &[Part<'_>], part: &Part<'_>, outcome: &Outcome) -> Vec<Chart
             chart.curves.push(h);
             // It shares the legend entry of h.
             chart.curves.extend(curve(recording, &signal("profile"), "", colour, Style::Dashed));
+            let band = tube.and_then(|tube| tube.h.iter().find(|(name, _)| name == barrier));
+            areas.extend(band.map(|(_, band)| Area::new(vec![band.ring()], colour)));
             colour += 1;
             let promise = outcome.promises.iter().find(|p| p.barrier == name);
             let Some(at) = promise.and_then(|p| p.deadline) else { continue };
@@ -355,13 +389,26 @@ fn barriers(parts: &[Part<'_>], part: &Part<'_>, outcome: &Outcome) -> Vec<Chart
         if let [only] = &mut chart.verticals[..] {
             only.label = "deadline".to_owned();
         }
-        (!chart.curves.is_empty()).then_some(chart)
+        chart.y.range = with_areas(&chart, &areas);
+        (!chart.curves.is_empty()).then_some((chart, areas))
     };
     part.barriers().into_iter().filter_map(chart).collect()
 }
 
+/// The range of the y axis that shows the curves and what is beneath them; `None` if there is nothing beneath.
+fn with_areas(chart: &Chart, areas: &[Area]) -> Option<[f64; 2]> {
+    let beneath: Vec<_> = areas.iter().filter_map(Area::extent).collect();
+    if beneath.is_empty() {
+        return None;
+    }
+    let ends = beneath.iter().flat_map(|(low, high)| [*low, *high]);
+    let (low, high) = plot::extent(chart.curves.iter().flat_map(|c| c.y.iter().copied()).chain(ends))?;
+    let room = 0.04 * (high - low);
+    Some([low - room, high + room])
+}
+
 /// Each input with u_ref and its limits.
-fn inputs(parts: &[Part<'_>], part: &Part<'_>, outcome: &Outcome) -> Vec<Chart> {
+fn inputs(parts: &[Part<'_>], part: &Part<'_>, outcome: &Outcome, tube: Option<&FirstTube>) -> Vec<Layers> {
     let recording = &outcome.recording;
     let chart = |input: &str| {
         let signal = part.signal(&format!("u.{input}"));
@@ -382,14 +429,17 @@ fn inputs(parts: &[Part<'_>], part: &Part<'_>, outcome: &Outcome) -> Vec<Chart> 
         };
         let wanted = if dashed.is_some() { ", u_ref dashed" } else { "" };
         let limit = |(side, at): (&str, Option<f64>)| at.map(|at| Mark { label: side.to_owned(), at });
-        Some(Chart {
+        let band = tube.and_then(|tube| tube.inputs.iter().find(|(name, _)| name == input));
+        let areas = band.map(|(_, band)| Area::new(vec![band.ring()], 0));
+        let chart = Chart {
             title: format!("{input}{wanted}"),
             x: time_axis(outcome),
             y: Scaling { label: labelled(input, &unit), range, logarithmic: false },
             curves: std::iter::once(solid).chain(dashed).collect(),
             horizontals: ["lower limit", "upper limit"].into_iter().zip(limits).filter_map(limit).collect(),
             ..Chart::default()
-        })
+        };
+        Some((chart, areas.into_iter().collect()))
     };
     part.inputs().into_iter().filter_map(chart).collect()
 }

@@ -30,6 +30,22 @@
   };
   const movers = [];
 
+  // The tube of a first plan, beneath the curves.
+  for (const [key, areas] of scene.areas) {
+    const view = views.get(key);
+    if (!view) continue;
+    const draw = () => {
+      const beneath = make("g", { class: "tube", "pointer-events": "none" });
+      for (const area of areas) {
+        const line = (ring) => `M${ring.map(([x, y]) => `${view.X(x).toFixed(1)} ${view.Y(y).toFixed(1)}`).join("L")}Z`;
+        make("path", { d: area.rings.map(line).join(""), fill: colour(area.colour) }, beneath);
+      }
+      view.inner.prepend(beneath);
+    };
+    view.after.push(draw);
+    draw();
+  }
+
   const path = views.get("path");
   if (path) {
     const outline = (o) => {

@@ -130,6 +130,26 @@ fn centre(part: &Part<'_>, section: &BarrierSection, recording: &Recording) -> O
     })
 }
 
+/// A part of the tube of a first plan, as filled outlines in the units of a chart's axes.
+#[derive(Serialize)]
+pub(super) struct Area {
+    rings: Vec<Vec<[f64; 2]>>,
+    /// Its colour as an index into the palette.
+    colour: usize,
+}
+
+impl Area {
+    pub(super) fn new(mut rings: Vec<Vec<[f64; 2]>>, colour: usize) -> Self {
+        rings.iter_mut().flatten().for_each(|corner| *corner = corner.map(plot::seven_digits));
+        Self { rings, colour }
+    }
+
+    /// The least and the greatest y.
+    pub(super) fn extent(&self) -> Option<(f64, f64)> {
+        plot::extent(self.rings.iter().flatten().map(|corner| corner[1]))
+    }
+}
+
 /// The status of a filter over time.
 #[derive(Serialize)]
 pub(super) struct Strip {

@@ -106,7 +106,7 @@ fn alone(case: Case, folder: &Path, mut progress: impl FnMut(f64)) -> Result<Run
         return Err(failure);
     }
     outcome.recording.save_csv(&path.with_extension("csv"), false)?;
-    let page = report::document(&name, &system, &models, &outcome, &outcome.notes);
+    let page = report::document(&name, (&system, &models), &outcome, &[], &outcome.notes);
     whole::write(&path.with_extension("html"), &page)?;
     let summary = Summary::new(&case, &outcome.recording, outcome.statistics.steps_per_second())?;
     Ok(Run { case, recording: outcome.recording, promises: outcome.promises, summary })
