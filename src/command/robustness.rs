@@ -1,6 +1,6 @@
 //! How much a plan bears of a plant that is not the model, and with how much less declared a refused promise would be kept.
 
-use punctual_core::filter::{Bears, Declared, Filter, Remedy};
+use punctual_core::filter::{Bears, Filter, Remedy, UncertaintyKind};
 use punctual_fmu::configuration::{FilterConfiguration, over_seconds};
 use serde::Serialize;
 
@@ -87,12 +87,12 @@ fn rounded(size: f64, unit: &str) -> String {
 /// With how much less declared the promises from `x0` at `t` would be kept, in words.
 pub(super) fn remedy(c: &FilterConfiguration, filter: &Filter, t: f64, x0: &[f64]) -> Option<String> {
     let Remedy { without, part, .. } = filter.planning()?.remedy(t, x0)?;
-    let word = |kind: &Declared| match kind {
-        Declared::Jitter => Some("jitter"),
-        Declared::Lags => Some("lags"),
-        Declared::Gains => Some("gains"),
-        Declared::Errors => Some("measurement_errors"),
-        Declared::Rates => Some("rates"),
+    let word = |kind: &UncertaintyKind| match kind {
+        UncertaintyKind::Jitter => Some("jitter"),
+        UncertaintyKind::Lags => Some("lags"),
+        UncertaintyKind::Gains => Some("gains"),
+        UncertaintyKind::Errors => Some("measurement_errors"),
+        UncertaintyKind::Rates => Some("rates"),
         _ => None,
     };
     let kinds: Vec<_> = without.iter().filter_map(word).collect();

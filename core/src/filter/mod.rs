@@ -26,8 +26,8 @@ pub use crate::convergence::{
 pub use crate::plan::Motion;
 #[cfg(feature = "plan")]
 pub use backup::{
-    Appraisal, Assurance, AssuranceStatus, Bears, Declared, Driver, PlanState, Planning, Plans, Reason,
-    Remedy,
+    Appraisal, Assurance, AssuranceStatus, Bears, Driver, PlanState, Planning, Plans, Reason, Remedy,
+    UncertaintyKind,
 };
 pub use builder::FilterBuilder;
 pub use integrator::Integration;

@@ -8,6 +8,7 @@ use super::first::First;
 use super::settings::DECISIONS;
 use super::state::Promise;
 use crate::elementary;
+use crate::lie::Predict;
 use crate::plan::{Plan, Planner, Tracking, Uncertainty, slopes};
 
 /// How much of each kind of uncertainty a plan from a first sample bears if it is declared, each alone: at least that much, since a
@@ -32,7 +33,7 @@ pub struct Bears {
 /// What is declared of a plant, by kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Declared {
+pub enum UncertaintyKind {
     /// When samples come.
     Jitter,
     /// How late inputs are followed.
@@ -45,7 +46,7 @@ pub enum Declared {
     Rates,
 }
 
-impl Declared {
+impl UncertaintyKind {
     /// All of them.
     pub const ALL: [Self; 5] = [Self::Jitter, Self::Lags, Self::Gains, Self::Errors, Self::Rates];
 }
@@ -55,7 +56,7 @@ impl Declared {
 #[non_exhaustive]
 pub struct Remedy {
     /// Without any one of these kinds.
-    pub without: Vec<Declared>,
+    pub without: Vec<UncertaintyKind>,
     /// With this part of all that is declared, < 1.
     pub part: Option<f64>,
 }
@@ -110,8 +111,7 @@ impl Planning<'_> {
             jitter: 0.0,
         };
         let measured_at = Some((t, &measured[..]));
-        let own =
-            Planning { measured: measured_at, courses: &courses, uncertainty: Some(&none), ..*self };
+        let own = Planning { measured: measured_at, courses: &courses, uncertainty: Some(&none), ..*self };
         let (promises, at) = (&first.promises, (acts, self.plans.period));
         let plan = own.cautious(first, at, &x);
         let keeps = |uncertainty: &Uncertainty, law: &Tracking| {
@@ -170,14 +170,14 @@ impl Planning<'_> {
         let (acts, x) = self.acts(t, &measured);
         let at = (acts, self.plans.period);
         let promises = || own.promises(acts, &x, |_| 1.0);
-        let without = |kind: &Declared| {
+        let without = |kind: &UncertaintyKind| {
             let mut less = declared.clone();
             match kind {
-                Declared::Jitter => less.jitter = 0.0,
-                Declared::Lags => less.lags.fill([0.0; 2]),
-                Declared::Gains => less.gains.fill([1.0; 2]),
-                Declared::Errors => less.errors.fill(0.0),
-                Declared::Rates => less.rates.fill(0.0),
+                UncertaintyKind::Jitter => less.jitter = 0.0,
+                UncertaintyKind::Lags => less.lags.fill([0.0; 2]),
+                UncertaintyKind::Gains => less.gains.fill([1.0; 2]),
+                UncertaintyKind::Errors => less.errors.fill(0.0),
+                UncertaintyKind::Rates => less.rates.fill(0.0),
             }
             less
         };
@@ -185,7 +185,7 @@ impl Planning<'_> {
             let own = Planning { uncertainty: Some(of), ..own };
             own.first(promises(), at, &x, &[], &DECISIONS.shorter).is_ok()
         };
-        let matters = Declared::ALL.into_iter().filter(|kind| without(kind) != *declared);
+        let matters = UncertaintyKind::ALL.into_iter().filter(|kind| without(kind) != *declared);
         let without = matters.filter(|kind| is_found(&without(kind))).collect();
         // Beside a plan for the model.
         let exact = Planning { uncertainty: None, ..own };
@@ -215,7 +215,7 @@ impl Planning<'_> {
         let way = self.along(&plan.backup_plan, at.0, x, (end - at.0) / PLACES as f64);
         let places = way.iter().step_by(way.len().div_ceil(PLACES).max(1));
         let mut gradient = x.to_vec();
-        let mut change = |model| {
+        let mut change = |model: &dyn Predict| {
             let at = |(t, x, _): &(f64, Vec<f64>, _)| {
                 slopes(model, *t, x, &mut gradient);
                 let moves = (0..x.len()).map(|i| gradient[i].abs() * plan.backup_plan.largest_rate(i));
@@ -223,7 +223,7 @@ impl Planning<'_> {
             };
             places.clone().map(at).fold(0.0, f64::max)
         };
-        let changes: Vec<f64> = self.models().map(&mut change).collect();
+        let changes: Vec<f64> = self.models().map(|model| change(&*model)).collect();
         let with_room = |room: &f64| {
             let mut wanted = promises.clone();
             for ((promise, model), change) in wanted.iter_mut().zip(self.models()).zip(&changes) {

@@ -37,7 +37,7 @@ use crate::interval::Interval;
 use crate::lie::{Direction, Second, SharedPlant};
 use crate::plan::{BackupPlan, Motion, Policy, Uncertainty};
 use crate::qp::Bounds;
-pub use bears::{Bears, Declared, Remedy};
+pub use bears::{Bears, Remedy, UncertaintyKind};
 use choice::Piece;
 pub use first::Appraisal;
 pub use planning::Planning;
