@@ -81,6 +81,8 @@ const SCALES: i32 = 10;
 const STEP: f64 = core::f64::consts::SQRT_2;
 /// The largest part of an input that may be missing.
 const MOST: f64 = 0.99;
+/// The longest time constant in s that is tried: an input that is followed later has hardly any effect.
+const LATEST: f64 = 10.0;
 
 impl Planning<'_> {
     /// What a plan that a first sample at `t` and `x` might find bears, for a plant that is the model but for one thing. `None`
@@ -141,11 +143,10 @@ impl Planning<'_> {
             largest_of(&laws, first, most, with)
         };
         // Where inputs change much from hold to hold, only a quick law follows them late.
-        let late =
-            |with: &dyn Fn(&mut Uncertainty, f64)| match largest(self.plans.period, f64::INFINITY, with) {
-                0.0 => largest_of(&of(MORE_HOLDS), self.plans.period, f64::INFINITY, with),
-                found => found,
-            };
+        let late = |with: &dyn Fn(&mut Uncertainty, f64)| match largest(self.plans.period, LATEST, with) {
+            0.0 => largest_of(&of(MORE_HOLDS), self.plans.period, LATEST, with),
+            found => found,
+        };
         let typical = |i: usize| FIRST * plan.backup_plan.largest_rate(i).max(f64::MIN_POSITIVE);
         let each = |count: usize, size: &dyn Fn(usize) -> f64| (0..count).map(size).collect::<Vec<f64>>();
         Some(Bears {
