@@ -182,6 +182,12 @@ fn what_cannot_be_drawn_is_refused() {
         &campaign(1, ""),
         "has no plant to draw: no filter of the system declares [uncertainty], [measurement_errors] or actuation_delay",
     );
+    let follows = FILTER.replacen("radius", "centre_input = true\nacceleration = 0.1\nradius", 1);
+    refused(
+        &follows,
+        &campaign(1, ""),
+        "goal follows a centre that moves by itself, and how that moves is not drawn yet",
+    );
     let rows = FILTER.replace("\"on\"", "\"off\"").replace("uncertainty = {", "# {");
     refused(
         &rows,

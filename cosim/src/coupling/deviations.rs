@@ -159,6 +159,12 @@ pub fn deviations(
                 filter.unassured()
             ));
         }
+        if let Some(barrier) = filter.barrier.iter().find(|barrier| barrier.shape.followed().is_some()) {
+            return refuse(format!(
+                "{} follows a centre that moves by itself, and how that moves is not drawn yet",
+                barrier.name
+            ));
+        }
         if let Some(key) = owner.start.keys().find(|key| !may_differ(Role::Filter, key)) {
             return refuse(format!(
                 "the system gives {key} a value, which may not be that of the file; state it there"
