@@ -113,6 +113,41 @@ fn what_is_identified_makes_the_promise_hold() {
     assert!(!kept.stderr.contains("is lost"), "{kept:#?}");
 }
 
+/// The cart of docs/mismatch.md, whose mass is known within an interval: guaranteed at every sample for carts in it, and one
+/// far outside is noticed.
+#[test]
+fn a_parameter_within_an_interval_is_a_state_with_an_error() {
+    let page = include_str!("../../docs/mismatch.md");
+    let (_, block) = page.split_once("## A parameter within an interval").expect("the section");
+    let file = block.split("```toml\n").nth(1).and_then(|block| block.split("```").next()).expect("a file");
+    let workshop = Workshop::new();
+    workshop.write("filter.toml", file);
+    let plant = "kind = \"plant\"\n[plant]\n\
+                 states = [{ name = \"x\", unit = \"m\" }, { name = \"v\", unit = \"m/s\" }]\n\
+                 inputs = [{ name = \"force\", unit = \"N\" }]\n\
+                 parameters = [{ name = \"c\", start = 0.5, unit = \"kg/s\" }, { name = \"m\", start = 2.0, unit = \"kg\" }]\n\
+                 derivatives = { x = \"v\", v = \"(force - c * v) / m\" }\n";
+    workshop.write("plant.toml", plant);
+    let run = |mass: f64| {
+        let system = format!(
+            "[experiment]\nstop_time = 8.0\nstep = 0.02\n\
+             [[component]]\nname = \"filter\"\nfmu = \"filter.toml\"\nstart = {{ \"x.m\" = 2.0 }}\n\
+             [[component]]\nname = \"plant\"\nfmu = \"plant.toml\"\nstart = {{ m = {mass:?} }}\n\
+             [[connect_by_name]]\ncomponents = [\"filter\", \"plant\"]\n\
+             [[connection]]\nfrom = \"plant.x.v\"\nto = \"filter.u_ref.force\"\nfactor = -1.0\noffset = 4.0\n"
+        );
+        workshop.write("system.toml", system);
+        workshop.punctual(["run", "system.toml", "--require", "guaranteed", "--out", "out"])
+    };
+    for mass in [1.86, 1.93, 2.0, 2.14] {
+        let kept = run(mass);
+        assert_eq!(kept.code, 0, "{mass} kg: {kept:#?}");
+    }
+    let lost = run(2.6);
+    assert_eq!(lost.code, 1, "{lost:#?}");
+    assert!(lost.stderr.contains("farther from the plan than the declared uncertainty allows"), "{lost:#?}");
+}
+
 /// The same lines from the FMU, whose variables may have names of their own.
 #[test]
 fn an_fmu_is_excited() {
