@@ -218,6 +218,21 @@ fn a_plant_beyond_what_was_declared_loses_the_promise() {
     assert!(lost >= 4, "{lost}");
 }
 
+/// And it stays down for as long as the plant goes on like that: a wind of eight times what was declared is seen in every hold.
+#[test]
+fn a_plant_that_was_lost_is_not_trusted_before_it_moves_as_declared() {
+    let mut draws = Draws(8);
+    let case = Case::draw(&mut draws, [4.0, 4.0], true);
+    let declared = Declared { rates: [0.0, 0.0, 0.1, 0.1], errors: [1e-4; 4], ..Declared::nothing() };
+    let how = |worse| Run { adversary: Adversary::Constant, asks: Asks::Zero, seed: 1, time: 4.0, worse };
+    let outcome = run(&PointMass, &case, &declared, &how(8.0));
+    // From the second sample on.
+    let samples = (4.0 / PERIOD) as usize - 1;
+    assert!(outcome.accepted && outcome.withdrawn == samples, "{outcome:?}");
+    assert!(outcome.failure.contains("declared uncertainty"), "{outcome:?}");
+    assert_eq!(run(&PointMass, &case, &declared, &how(1.0)).withdrawn, 0);
+}
+
 /// No feedback has bounds enough for a wind that pushes as hard as the inputs do.
 #[test]
 fn what_cannot_be_kept_is_refused() {

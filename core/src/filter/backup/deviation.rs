@@ -12,7 +12,7 @@ use super::settings::DECISIONS;
 pub(super) struct Deviation {
     /// When the present measuring interval began, in s, at a measured state.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
-    since: f64,
+    pub(super) since: f64,
     /// The state predicted by the model from there until the last sample.
     pub(super) state: Vec<f64>,
     /// The rate of deviation of each state over the last interval, in its unit per s.

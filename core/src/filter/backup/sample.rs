@@ -316,11 +316,21 @@ impl Decision<'_> {
             self.next().courses = courses;
             return Some(failure);
         }
-        if self.uncertainty.is_none() || self.before().status != AssuranceStatus::Assured {
-            return None;
-        }
+        let of = self.uncertainty?;
         let planned = self.planning().planned(&self.now().promises, (t, hold), u, |planner| {
-            planner.is_declared(&self.before().plan, t, x)
+            let PlanState { status, plan, deviation, .. } = self.before();
+            match status {
+                AssuranceStatus::Assured => planner.is_declared(plan, t, x),
+                // Nor is a plant that was lost, before it moves as declared again.
+                AssuranceStatus::Lost if self.rows.delay == 0.0 && !of.lags() && of.jitter == 0.0 => {
+                    let (since, input) = (deviation.since, &self.rows.state.input[..self.rows.input_dim]);
+                    match since < t && self.before().last_time() == Some(since) {
+                        true => planner.was_declared((since, &deviation.state), input, (t, x)),
+                        false => Ok(()),
+                    }
+                }
+                _ => Ok(()),
+            }
         });
         planned.err().filter(|failure| matches!(failure, Failure::Undeclared { .. }))
     }

@@ -462,6 +462,32 @@ impl<'a> Planner<'a> {
         }
     }
 
+    /// Whether a plant that was measured at `from` at `since`, and received `u` from then on, can be measured at `x` at `t`: for
+    /// inputs that act at once, as they are asked.
+    ///
+    /// # Errors
+    ///
+    /// By how much it cannot; no bound was found.
+    pub(crate) fn was_declared(
+        &self,
+        (since, from): (f64, &[f64]),
+        u: &[f64],
+        (t, x): (f64, &[f64]),
+    ) -> Result<(), Failure> {
+        let Some(uncertain) = self.uncertain else { return Ok(()) };
+        let (tube, _) = self.measured(Uncertain { measured: None, ..uncertain })?;
+        let grid = Grid { period: t - since, even: true };
+        let walk = Walk::new(self.model(t - since), self.tolerances, &[], 1.0, grid, (since, from))?;
+        let mut walk = walk.within(tube)?;
+        walk.hold_in_tube(u, None, t)?;
+        let (states, radii) = (vec![walk.state().to_vec()], walk.tube().map(|tube| vec![tube.radii()]));
+        let reached = Tracking { states, radii: radii.unwrap_or_default(), ..Tracking::default() };
+        match reached.escaped((0, &reached.states[0]), x) {
+            Some((state, beyond)) => Err(Failure::Undeclared { state, beyond }),
+            None => Ok(()),
+        }
+    }
+
     /// The hold of `law` at `t`, and its reference there: at the beginning of a hold, or anywhere if samples may be late.
     fn seen(&self, law: &Tracking, t: f64) -> Option<(usize, Vec<f64>)> {
         let slack = self.tolerances.on_time * self.period;
