@@ -114,8 +114,8 @@ fn what_no_plan_accounts_for_is_an_error() {
     workshop.write("filter.toml", followed);
     workshop.punctual(["check", "filter.toml"]).fails_like(
         2,
-        "filter.toml: assurance: is \"on\", must be \"off\": a barrier follows ",
-        &["which is moved from outside, so that no plan can predict it"],
+        "filter.toml: assurance: is \"on\", must be \"off\": tree follows a centre that is moved from outside",
+        &["no plan can predict it without its `acceleration`"],
     );
 }
 
@@ -264,7 +264,7 @@ const DECLARED: [(&str, &str, &[&str]); 8] = [
     ("", "disturbance = 0.2", &["tree.disturbance is 0.2, "]),
     ("", "begin = 1.0\ndeadline = 9.0", &["tree.begin is 1, "]),
     ("", "after = \"goal\"", &["tree.after is \"goal\", "]),
-    ("", "centre_input = true", &["a barrier follows tree.centre[1], "]),
+    ("", "centre_input = true", &["tree follows a centre that is moved from outside, "]),
     ("", "velocity = [1.0, 0.0]", &["goal moves with time, ", "(`plan_horizon`)"]),
     (
         "actuation_delay = 0.1",
