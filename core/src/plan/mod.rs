@@ -120,7 +120,8 @@ impl Plan {
     }
 
     /// Its flaw as a plan for a plant with `states` states and `inputs` inputs, if any. A plan from a file may have one.
-    pub(crate) fn flaw(&self, [states, inputs]: [usize; 2]) -> Option<&'static str> {
+    /// `is_kept`: a promise rests on it; otherwise it may have [forgotten](BackupPlan::forget) a law, which leaves its end.
+    pub(crate) fn flaw(&self, [states, inputs]: [usize; 2], is_kept: bool) -> Option<&'static str> {
         let is_flawed = self.stopping.as_ref().is_some_and(|stopping| !stopping.fits(states, inputs))
             || self.reference.as_ref().is_some_and(|reference| !reference.fits(states, inputs))
             || self.backup_plan.rates.len() != states
@@ -130,7 +131,8 @@ impl Plan {
             || !self.reserve.iter().all(|reserve| reserve.is_finite() && *reserve >= 0.0)
             || match (&self.stopping, &self.reference) {
                 (Some(_), _) => {
-                    self.backup_plan.until != f64::INFINITY && self.backup_plan.tracking.is_none()
+                    let is_dated = self.backup_plan.until != f64::INFINITY;
+                    is_dated && self.backup_plan.tracking.is_none() && is_kept
                 }
                 (None, Some(_)) => !self.backup_plan.until.is_finite(),
                 (None, None) => true,

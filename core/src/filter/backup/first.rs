@@ -84,10 +84,10 @@ impl Planning<'_> {
     /// The factor is accurate to a fiftieth, or less if a plan arrives sooner than it has to. The search goes no further
     /// than `longest` times the deadlines, nor to a deadline after the end of its barrier.
     pub fn earliest_deadline(&self, t: f64, x: &[f64], longest: f64) -> Option<(f64, BackupPlan)> {
-        let measured = self.state(x);
-        let own = Planning { measured: Some((t, &measured)), ..*self };
+        let (measured, courses) = (self.state(x), self.courses(t, x));
+        let own = Planning { measured: Some((t, &measured)), courses: &courses, ..*self };
         let (acts, state) = self.acts(t, &measured);
-        let promises = self.promises(acts, &state, |_| 1.0);
+        let promises = own.promises(acts, &state, |_| 1.0);
         let first = own.first(promises, (acts, self.plans.period), &state, &[], &DECISIONS.shorter);
         self.least(t, x, longest, first.ok())
     }

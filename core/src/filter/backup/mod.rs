@@ -648,7 +648,8 @@ impl Backup {
     /// A plan of another filter, or one that is damaged.
     pub(super) fn check(&self, rows: &Rows, state: &FilterState) -> Result<(), Error> {
         let is_fresh = state.time.is_none();
-        state.plan.check([self.states, rows.input_dim], rows.slots.len(), is_fresh, self.plans.horizon)
+        let follows: Vec<bool> = rows.slots.iter().map(|slot| slot.source.follows().is_some()).collect();
+        state.plan.check([self.states, rows.input_dim], &follows, is_fresh, self.plans.horizon)
     }
 
     /// Turns the derivative `out` of the rows' answer into that of the input actually applied; `inside` is the model's.

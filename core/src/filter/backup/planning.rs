@@ -110,6 +110,12 @@ impl<'a> Planning<'a> {
         self.courses.iter().map(|course| course.as_ref().map(dated)).collect()
     }
 
+    /// When in s the next sample comes at the latest, if the input of that at `t` is held for `hold` s.
+    pub(super) fn next_by(&self, t: f64, hold: f64) -> f64 {
+        let late = self.uncertainty.map_or(0.0, |of| of.jitter) * self.plans.period;
+        t + if late > 0.0 { hold.max(self.plans.period + late) } else { hold }
+    }
+
     /// How far in s past the last deadline and the sample a plan accounts for points.
     fn ahead(&self) -> f64 {
         self.plans.horizon.map_or(DECISIONS.uncertain_horizon, |horizon| SETTINGS.ample * horizon)

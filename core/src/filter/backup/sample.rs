@@ -425,20 +425,30 @@ impl Decision<'_> {
             rows: u,
             reached: self.now().promises.iter().flatten().all(|promise| promise.from <= t),
         };
+        // A law that goes on rests on what was measured when it was checked.
+        let law = |plan: &BackupPlan| plan.tracking().map(core::ptr::from_ref);
+        let last = law(&self.before().plan.backup_plan);
+        let goes_on = |plan: &BackupPlan| last.is_some() && law(plan) == last;
+        let is_known = self.before().reaches(self.planning().next_by(t, hold));
         let search = |planning: Planning<'_>, memory: &mut ChoiceMemory| {
             planning.planned(&self.now().promises, (t, hold), u, |planner| {
                 let planner = planner.irregular(!is_regular).hurried(planning.plans.search_budget);
                 let chosen = planning.chosen(&planner, (t, x), wish, memory)?;
-                Ok(planning.smoothed(&planner, (t, x), chosen, wish.reached))
+                let chosen = planning.smoothed(&planner, (t, x), chosen, wish.reached);
+                // It may end later than what is known of a point.
+                if goes_on(&chosen.backup_plan) && !is_known { Err(Failure::NoRest) } else { Ok(chosen) }
             })
         };
         let mut found = search(planning, &mut memory);
         let (promises, before) = (&self.now().promises, &self.before().courses);
         let (mut courses, mut regained) = (planning.rests_on(t, promises), SearchProgress::default());
-        if found.is_err() && !before.is_empty() && self.before().reaches(t + hold) {
+        if found.is_err() && !before.is_empty() && is_known {
             // What was known before still holds, until then. Meanwhile another plan is sought that reaches farther.
             memory = self.now().memory.clone();
-            found = search(Planning { courses: before, ..planning }, &mut memory);
+            let known = Planning { courses: before, ..planning };
+            found = search(known, &mut memory);
+            // The last deadline may be gone since then, and a plan is kept no farther than from now on.
+            let before = known.rests_on(t, promises);
             let plan = &self.now().plan;
             if found.is_ok() && is_regular && !plan.is_finite() {
                 regained.clone_from(&self.now().regained);
@@ -453,10 +463,10 @@ impl Decision<'_> {
                         found = Ok(Chosen { driver, piece, share: 1.0, backup_plan, plan: Some(plan) });
                         regained = SearchProgress::default();
                     }
-                    Err(_) => courses.clone_from(before),
+                    Err(_) => courses = before,
                 }
             } else {
-                courses.clone_from(before);
+                courses = before;
             }
         }
         match found {
@@ -466,11 +476,7 @@ impl Decision<'_> {
                 u.copy_from_slice(&backup_plan.inputs[0].1[..u.len()]);
                 self.assurance.reason = memory.reason.filter(|_| *u != wanted[..u.len()]);
                 *self.piece = piece;
-                // A law that goes on rests on what was measured when it was checked.
-                let law = |plan: &BackupPlan| plan.tracking().map(core::ptr::from_ref);
-                let goes_on =
-                    law(&backup_plan).is_some() && law(&backup_plan) == law(&self.before().plan.backup_plan);
-                let courses = if goes_on { self.before().courses.clone() } else { courses };
+                let courses = if goes_on(&backup_plan) { self.before().courses.clone() } else { courses };
                 let next = self.next();
                 (next.memory, next.share) = (memory, share);
                 (next.lost, next.regained) = (None, regained);

@@ -160,8 +160,8 @@ impl PlanState {
         })
     }
 
-    /// Checks a memory to be restored into a filter with `barriers` barriers, whose model has as many states and inputs as
-    /// `dims` says. `is_fresh`: the filter has had no sample yet.
+    /// Checks a memory to be restored into a filter with as many barriers as `follows`, which says of each whether it follows
+    /// a measured point. The model has as many states and inputs as `dims` says. `is_fresh`: the filter has had no sample yet.
     ///
     /// # Errors
     ///
@@ -169,7 +169,7 @@ impl PlanState {
     pub(super) fn check(
         &self,
         dims: [usize; 2],
-        barriers: usize,
+        follows: &[bool],
         is_fresh: bool,
         horizon: Option<f64>,
     ) -> Result<(), Error> {
@@ -190,13 +190,13 @@ impl PlanState {
         } = self;
         let refuse = |field: &str, message: &str| Err(Error::new(ErrorKind::Dimension, field, message));
         if *status != AssuranceStatus::Undecided {
-            length("promises", promises.len(), barriers)?;
+            length("promises", promises.len(), follows.len())?;
         }
         if *status == AssuranceStatus::Undecided && !is_fresh {
             return refuse("status", "is undecided, beside samples that were decided on");
         }
         if self.is_followed() || *status == AssuranceStatus::Undecided && !plan.is_empty() {
-            if let Some(flaw) = plan.flaw(dims) {
+            if let Some(flaw) = plan.flaw(dims, *status == AssuranceStatus::Assured) {
                 return refuse("plan", flaw);
             }
             if !(0.0..=1.0).contains(share) {
@@ -227,8 +227,12 @@ impl PlanState {
             let is_course = |course: &Course| {
                 course.since.is_finite() && all_finite(&course.point) && !course.until.is_nan()
             };
-            if ![0, barriers].contains(&courses.len()) || !courses.iter().flatten().all(is_course) {
-                return refuse("courses", "are not of as many barriers, or not finite");
+            // Before a decision the plan of an earlier one rests on nothing.
+            let is_alone = !follows.contains(&true) || *status == AssuranceStatus::Undecided;
+            let are_theirs = courses.iter().map(Option::is_some).eq(follows.iter().copied());
+            let are_courses = are_theirs || courses.is_empty() && is_alone;
+            if !are_courses || !courses.iter().flatten().all(is_course) {
+                return refuse("courses", "are not those of the barriers, or not finite");
             }
             if !interval.is_finite() {
                 return refuse("interval", "is not finite");
