@@ -163,7 +163,7 @@ impl Plans {
 
     /// Declares how the point moves that barrier number `barrier` [follows](crate::lie::following): its acceleration, and the
     /// errors with which it is measured. Every promise is then kept however it moves within that. Without it no plan accounts
-    /// for such a barrier. The promise has an [end](Assurance::until), which is postponed again and again: 2 s past the last
+    /// for such a barrier. The promise has an [end](Assurance::until), which is postponed again and again: 3 s past the last
     /// deadline and the sample, or as far as the [horizon](Self::horizon).
     ///
     /// ```
