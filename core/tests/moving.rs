@@ -264,7 +264,7 @@ fn tally<P>(name: &str, plant: &P, time: f64, seed: u64, draw: impl Fn(&mut Draw
 where
     P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
 {
-    let cases = std::env::var("PUNCTUAL_MOVING").map_or(5, |cases| cases.parse().unwrap());
+    let cases = std::env::var("PUNCTUAL_MOVING").map_or(3, |cases| cases.parse().unwrap());
     let (mut draws, mut tally) = (Draws(seed), Tally { least: f64::INFINITY, ..Tally::default() });
     for k in 0..cases {
         let case = draw(&mut draws);

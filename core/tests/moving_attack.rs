@@ -593,7 +593,7 @@ const ROUND_OFF: f64 = -1e-7;
 #[test]
 fn what_is_guaranteed_is_kept_whatever_points_and_clocks_do() {
     let number = |name: &str, default: u64| std::env::var(name).map_or(default, |text| text.parse().unwrap());
-    let (cases, first) = (number("PUNCTUAL_MOVING", 8), number("PUNCTUAL_FIRST", 0));
+    let (cases, first) = (number("PUNCTUAL_MOVING", 4), number("PUNCTUAL_FIRST", 0));
     let (mut broken, mut accepted, mut samples, mut assured) = (Vec::new(), 0, 0, 0);
     let (mut withdrawn, mut expired) = (0, 0);
     for k in first..first + cases {
