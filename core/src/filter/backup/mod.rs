@@ -171,12 +171,11 @@ impl Plans {
     /// // x = (x_p, y_p, θ, v, p_x, p_y, v_x, v_y): a cyclist at p.
     /// let clear = Outside(DistanceDisc::new([0.0, 0.0], 2.0, 1.0)?.following(4));
     /// let mut filter = Filter::builder(Unicycle)
-    ///     .barrier("goal", DistanceDisc::new([12.0, 0.0], 2.0, 1.0)?, BarrierSettings::within(6.0))?
     ///     .following::<_, 8>("cyclist", clear, BarrierSettings::keeping())?
     ///     .bounds(&[-4.0, -1.5], &[4.0, 1.5])?
     ///     .sampling(Sampling::Period(0.02))?
     ///     .build()?
-    ///     .with_plans(Plans::every(0.02).motion(1, Motion { acceleration: 0.3, ..Motion::default() }))?;
+    ///     .with_plans(Plans::every(0.02).motion(0, Motion { acceleration: 0.3, ..Motion::default() }))?;
     /// let (x, mut u) = ([0.0, 0.0, 0.0, 1.0, 6.0, -9.0, 0.0, 0.8], [0.0; 2]);
     /// assert!(filter.step(0.0, &x, &[4.0, 0.0], &mut u)?.is_assured());
     /// # Ok::<(), punctual_core::Error>(())
