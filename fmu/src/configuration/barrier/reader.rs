@@ -95,6 +95,9 @@ impl Reader<'_> {
     pub(super) fn point(&self) -> Result<Point, ConfigurationError> {
         let velocity = self.raw.velocity.unwrap_or_default();
         let RawBarrier { centre_input, acceleration, centre_error, velocity_error, .. } = *self.raw;
+        // An error of 0 is none.
+        let [centre_error, velocity_error] =
+            [centre_error, velocity_error].map(|error| error.filter(|error| *error != 0.0));
         let known = [
             ("acceleration", acceleration),
             ("centre_error", centre_error),
