@@ -186,7 +186,8 @@ fn what_cannot_be_drawn_is_refused() {
     refused(
         &follows,
         &campaign(1, ""),
-        "goal follows a centre that moves by itself, and how that moves is not drawn yet",
+        "has no plant to draw within what filter declares: goal follows a centre that moves by itself, and how that moves is not \
+         drawn yet",
     );
     let rows = FILTER.replace("\"on\"", "\"off\"").replace("uncertainty = {", "# {");
     refused(
