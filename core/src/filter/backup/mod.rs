@@ -267,7 +267,8 @@ impl Filter {
     /// known](crate::barrier::Barrier::range_from) how low h gets: at an equilibrium each set is checked at eight later
     /// times, up to a day, and no plan is found if it has moved. With a [horizon](Plans::horizon) they may move, and the
     /// plant needs no equilibrium: the promise then has an [end](Assurance::until), which is postponed again and again.
-    /// States must be those of the plant, not of something else that others move.
+    /// States must be those of the plant. What others
+    /// move belongs to barriers that follow it, with its [motion](Plans::motion).
     ///
     /// Plans account for the mean that a plant with an [integrator](Self::with_integrator) receives over each period, and
     /// keep the limits of the integral. The search allocates, and so do the plans.
