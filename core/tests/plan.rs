@@ -1160,8 +1160,8 @@ fn filters_that_plans_do_not_account_for_are_refused() {
     let within = BarrierSettings::within(5.0);
     let delayed = refused(within, |b| b.actuation_delay(0.01).expect("a delay"));
     assert_eq!(delayed, "");
-    let late = refused(within, |b| b.actuation_delay(0.05).expect("a delay"));
-    assert_eq!(late, "actuation_delay: is 0.05, must be <= period = 0.02 for a plan");
+    let late = refused(BarrierSettings::within(6.0), |b| b.actuation_delay(5.01).expect("a delay"));
+    assert_eq!(late, "actuation_delay: is 5.01, must be <= 250 times period = 0.02 for a plan");
     let erring = refused(within, |b| b.measurement_errors(&[0.1, 0.1, 0.0, 0.0]).expect("errors"));
     assert_eq!(erring, "");
     let disturbed = refused(within.disturbance(0.1), |b| b);

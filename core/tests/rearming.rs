@@ -256,17 +256,19 @@ fn a_method_that_fails_at_the_anchor_is_reported() {
     assert_eq!(filter.refusal(1), None);
 }
 
-/// One step of delay under a master that exchanges first: arrival and least h after the deadline, and the
+/// Some steps of delay, one of them under a master that exchanges first: arrival and least h after the deadline, and the
 /// number of steps whose constraint could not be met.
-fn jacobi(step: f64, x0: [f64; 4]) -> (Option<f64>, f64, usize) {
+fn late(steps: f64, step: f64, x0: [f64; 4]) -> (Option<f64>, f64, usize) {
     let settings = BarrierSettings::within(5.0).rate(5.0).stay_rate(5.0).margin(0.02);
     let mut filter = Filter::builder(Unicycle)
         .barrier("goal", distance_disc(), settings)
         .and_then(|b| b.sampling(Sampling::Period(step)))
-        .and_then(|b| b.actuation_delay(step))
+        .and_then(|b| b.actuation_delay(steps * step))
         .and_then(FilterBuilder::build)
         .expect("valid filter");
-    let (mut x, mut acting) = (x0, [0.0; 2]);
+    // Inputs that wait, the next one last; the part of a step before another acts.
+    let (mut x, mut waiting) = (x0, vec![[0.0; 2]; steps.ceil() as usize]);
+    let part = steps - (steps - 1.0).ceil();
     let (mut arrival, mut least, mut unmet) = (None, f64::INFINITY, 0);
     for k in 0..=(10.0 / step).round() as usize {
         let t = k as f64 * step;
@@ -281,20 +283,22 @@ fn jacobi(step: f64, x0: [f64; 4]) -> (Option<f64>, f64, usize) {
             least = least.min(h);
         }
         unmet += usize::from(!report.status.is_satisfied());
-        x = rk4_step(&Unicycle, &x, &acting, step);
-        acting = u;
+        waiting.insert(0, u);
+        let acting = waiting.pop().expect("an input");
+        x = rk4_step(&Unicycle, &x, &acting, part * step);
+        x = rk4_step(&Unicycle, &x, waiting.last().expect("an input"), (1.0 - part) * step);
     }
     (arrival, least, unmet)
 }
 
 #[test]
-fn a_delay_of_one_step_is_compensated() {
+fn a_delay_is_compensated() {
     for x0 in [[5.0, 5.0, 0.3, 2.0], [12.0, 3.0, -2.0, 6.0], [0.0, 18.0, 2.2, -7.0]] {
-        for step in [0.01, 0.05] {
-            let (arrival, least, unmet) = jacobi(step, x0);
-            assert!(arrival.is_some_and(|t| t <= 5.0), "{x0:?}, {step}: {arrival:?}");
-            assert!(least >= 0.0, "{x0:?}, {step}: {least}");
-            assert_eq!(unmet, 0, "{x0:?}, {step}");
+        for (steps, step) in [(1.0, 0.01), (1.0, 0.05), (0.4, 0.05), (2.0, 0.05), (7.3, 0.02)] {
+            let (arrival, least, unmet) = late(steps, step, x0);
+            assert!(arrival.is_some_and(|t| t <= 5.0), "{x0:?}, {steps}, {step}: {arrival:?}");
+            assert!(least >= 0.0, "{x0:?}, {steps}, {step}: {least}");
+            assert_eq!(unmet, 0, "{x0:?}, {steps}, {step}");
         }
     }
 }
@@ -331,9 +335,20 @@ fn a_delay_is_checked() {
     let refused = builder()
         .barrier("goal", distance_disc(), settings)
         .and_then(|b| b.sampling(Sampling::Period(0.01)))
-        .and_then(|b| b.actuation_delay(0.02))
+        .and_then(|b| b.actuation_delay(2.51))
         .and_then(FilterBuilder::build)
         .err()
         .expect("refused");
-    assert_eq!(refused.to_string(), "actuation_delay: is 0.02, must be <= sampling_period = 0.01");
+    assert_eq!(refused.to_string(), "actuation_delay: is 2.51, must be <= 250 times sampling_period = 0.01");
+    // No input acts before the deadline.
+    let mut filter = builder()
+        .barrier("goal", distance_disc(), settings)
+        .and_then(|b| b.actuation_delay(1.0))
+        .and_then(FilterBuilder::build)
+        .expect("valid filter");
+    let refused = filter.set_deadline(0, 1.0).expect_err("refused");
+    assert_eq!(
+        refused.to_string(),
+        "goal.deadline: is 1, must be > actuation_delay = 1: no input acts before"
+    );
 }

@@ -7,15 +7,15 @@
 //! | 38 | the GUID of the FMU, as in its model description |
 //! | 8 | total length |
 //! | … | the fields of [`State`]: mode, time, flags, values in the order of the table, memory of the block |
-//! | 8 + … | if plans are followed: the length of the plan state, and the plan state in the format of the crate postcard |
+//! | 8 + … | if plans are followed, or inputs may act late: length and content, in the format of the crate postcard, of the inputs on their way and the plan state |
 //! | 4 | CRC-32 of everything before |
 //!
 //! Numbers are stored bitwise, in little-endian order. A field has the same offset in every state of an FMU;
-//! absent optional fields keep their space. Only a plan has variable length, and it comes last. Damaged
+//! absent optional fields keep their space. Only that has variable length, and it comes last. Damaged
 //! bytes, and those of another FMU, are refused with the name of the field.
 
 use punctual_core::convergence::{FixedTimeState, Phase, Unmet};
-use punctual_core::filter::{Curvature, FilterState, PlanState};
+use punctual_core::filter::{Curvature, FilterState, PlanState, Sent};
 use punctual_modeldescription::BaseType;
 
 use crate::block::{BlockState, Values};
@@ -27,20 +27,20 @@ const MAGIC: [u8; 8] = *b"PUNCTUAL";
 
 /// Version of the layout, to be increased with every change of it. (The GUID changes with the version of the
 /// library.)
-const VERSION: u32 = 12;
+const VERSION: u32 = 13;
 
 const GUID: usize = 38;
 const HEADER: usize = MAGIC.len() + u32::SIZE + GUID + u64::SIZE;
 const CHECKSUM: usize = u32::SIZE;
 
-/// The number of bytes of `state`, a state of `product`. Without a plan, it is the same for all of them.
+/// The number of bytes of `state`, a state of `product`. Without a plan and a delay, it is the same for all of them.
 ///
 /// # Errors
 ///
-/// None in practice, since a plan state is plain data.
+/// None in practice, since the memory of a filter is plain data.
 pub fn size(product: &Product, state: &State) -> Result<usize, Failure> {
-    let plan = if follows_plans(product) { u64::SIZE + plan(state)?.len() } else { 0 };
-    Ok(fixed_size(product) + plan)
+    let tail = if has_tail(product) { u64::SIZE + tail(state)?.len() } else { 0 };
+    Ok(fixed_size(product) + tail)
 }
 
 /// Whether a state of `product` has a stop time; in FMI 2.0 it has none.
@@ -48,20 +48,24 @@ fn has_stop(product: &Product) -> bool {
     product.configuration.experiment().fmi == FmiVersion::Three
 }
 
-fn follows_plans(product: &Product) -> bool {
-    matches!(&product.configuration, Configuration::Filter(c) if c.is_assured())
+/// Whether states of `product` have a part of variable length.
+fn has_tail(product: &Product) -> bool {
+    matches!(&product.configuration, Configuration::Filter(c) if c.is_assured() || c.may_be_late())
 }
 
-/// The bytes of the plan state in `state`.
-fn plan(state: &State) -> Result<Vec<u8>, Failure> {
+/// The inputs on their way, and the plan state.
+type Tail = (Vec<Sent>, PlanState);
+
+/// The bytes of these in `state`.
+fn tail(state: &State) -> Result<Vec<u8>, Failure> {
     match &state.block {
-        BlockState::Filter { memory, .. } => postcard::to_stdvec(&memory.plan),
-        _ => postcard::to_stdvec(&PlanState::default()),
+        BlockState::Filter { memory, .. } => postcard::to_stdvec(&(&memory.sent, &memory.plan)),
+        _ => postcard::to_stdvec(&Tail::default()),
     }
     .map_err(|e| e.to_string())
 }
 
-/// The number of bytes of every state of `product`, without plans.
+/// The number of bytes of every state of `product`, without that part.
 fn fixed_size(product: &Product) -> usize {
     let flags = Mode::SIZE + 2 * f64::SIZE + 3 * bool::SIZE;
     let value = |base| match base {
@@ -94,8 +98,8 @@ fn fixed_size(product: &Product) -> usize {
 /// Too few bytes; the state of another product. Nothing was written.
 pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), Failure> {
     let State { guid, mode, time, stop, stepped, last_step, fresh, configured, values, block } = state;
-    let plan = follows_plans(product).then(|| plan(state)).transpose()?;
-    let size = fixed_size(product) + plan.as_ref().map_or(0, |plan| u64::SIZE + plan.len());
+    let tail = has_tail(product).then(|| tail(state)).transpose()?;
+    let size = fixed_size(product) + tail.as_ref().map_or(0, |tail| u64::SIZE + tail.len());
     if bytes.len() < size {
         return Err(format!("there is room for {} bytes, must be {size}", bytes.len()));
     }
@@ -127,8 +131,17 @@ pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), F
     // The memory of the block.
     match block {
         BlockState::Filter { rearm_seen, memory } => {
-            let FilterState { barriers, time, period, input, start, curvatures, integrated, plan: _ } =
-                &**memory;
+            let FilterState {
+                barriers,
+                time,
+                period,
+                input,
+                start,
+                curvatures,
+                integrated,
+                sent: _,
+                plan: _,
+            } = &**memory;
             rearm_seen.write(&mut out);
             barriers.iter().for_each(|barrier| barrier.write(&mut out));
             time.write(&mut out);
@@ -137,9 +150,9 @@ pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), F
             start.write(&mut out);
             curvatures.write(&mut out);
             integrated.write(&mut out);
-            if let Some(plan) = plan {
-                (plan.len() as u64).write(&mut out);
-                out.extend_from_slice(&plan);
+            if let Some(tail) = tail {
+                (tail.len() as u64).write(&mut out);
+                out.extend_from_slice(&tail);
             }
         }
         BlockState::Plant { x } => x.iter().for_each(|x| x.write(&mut out)),
@@ -175,9 +188,9 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
     }
     check_guid(product, input.take("GUID", GUID)?)?;
     let length: u64 = input.field("length")?;
-    let has_plan = follows_plans(product);
-    if !has_plan && length != fixed as u64 || length < fixed as u64 {
-        let least = if has_plan { "at least " } else { "" };
+    let has_tail = has_tail(product);
+    if !has_tail && length != fixed as u64 || length < fixed as u64 {
+        let least = if has_tail { "at least " } else { "" };
         return Err(format!("the length is {length} bytes, must be {least}{fixed}"));
     }
     let size = usize::try_from(length).unwrap_or(usize::MAX);
@@ -216,7 +229,7 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
         Configuration::Filter(c) => {
             let rearm_seen = input.field("rearm_seen")?;
             let barriers = c.barrier.iter().map(|b| input.field(&b.name)).collect::<Result<_, _>>()?;
-            let memory = FilterState {
+            let mut memory = FilterState {
                 barriers,
                 time: input.field("filter time")?,
                 period: input.field("period")?,
@@ -224,8 +237,11 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
                 start: input.field("start")?,
                 curvatures: input.field("curvatures")?,
                 integrated: input.finite("integrated")?,
-                plan: if has_plan { read_plan(&mut input)? } else { PlanState::default() },
+                ..FilterState::default()
             };
+            if has_tail {
+                (memory.sent, memory.plan) = read_tail(&mut input)?;
+            }
             BlockState::Filter { rearm_seen, memory: Box::new(memory) }
         }
         Configuration::Plant(_) => {
@@ -244,14 +260,14 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
     Ok(State { guid, mode, time, stop, stepped, last_step, fresh, configured, values, block })
 }
 
-/// The plan state, which comes last. Whether it belongs to this filter is checked when it is restored.
-fn read_plan(input: &mut Reader) -> Result<PlanState, Failure> {
+/// What comes last. Whether it belongs to this filter is checked when it is restored.
+fn read_tail(input: &mut Reader) -> Result<Tail, Failure> {
     let length: u64 = input.field("length of the plan")?;
     if length != input.rest.len() as u64 {
         return Err(format!("the length of the plan is {length} bytes, must be {}", input.rest.len()));
     }
     match postcard::take_from_bytes(input.rest) {
-        Ok((plan, [])) => Ok(plan),
+        Ok((tail, [])) => Ok(tail),
         Ok((_, rest)) => Err(format!("the plan is followed by {} bytes, must be 0", rest.len())),
         Err(error) => Err(format!("the plan cannot be read: {error}")),
     }

@@ -4,6 +4,8 @@
 //! Both are found by running the closed loop, so they hold for one start, one plant and one u_ref. They are
 //! also upper bounds: another filter may need less.
 
+use std::collections::VecDeque;
+
 use crate::simulation::Schedule;
 use punctual_core::MAX_INPUTS;
 use punctual_core::dynamics::DynPlant;
@@ -22,8 +24,7 @@ pub struct Loop<'a> {
     pub schedule: Schedule,
     /// Deadlines of the barriers, in s from the start; infinite for a barrier without one.
     pub deadlines: &'a [f64],
-    /// Time in s between the computation of an input and its effect, ≥ 0, at most a step. Until then the
-    /// previous input acts.
+    /// Time in s between the computation of an input and its effect, ≥ 0. Until then earlier inputs act, at first 0.
     pub delay: f64,
     /// Time in s after the start from which a broken promise ends the run.
     pub until: f64,
@@ -122,23 +123,25 @@ impl Running<'_> {
     }
 
     /// Moves the plant over the period that begins at `t`, and the points that follow its states in `x` at their velocities;
-    /// `last` is the input of the previous period.
+    /// `sent` are the inputs that act one after another, each with the time in s at which it begins to.
     fn advance(
         &mut self,
         filter: &Filter,
         t: f64,
         x: &mut [f64],
-        [last, u]: [&[f64]; 2],
+        sent: &VecDeque<(f64, Vec<f64>)>,
     ) -> Result<(), Error> {
-        let Loop { plant, schedule, deadlines, delay, start, .. } = *self.setting;
+        let Loop { plant, schedule, deadlines, start, .. } = *self.setting;
         let (step, substeps) = (schedule.step, schedule.substeps.max(1));
         let (same, mut at) = (1e-9 * step, 0.0);
         for j in 1..=substeps {
             let end = step * (j as f64 / substeps as f64);
             while at < end {
-                let cuts = deadlines.iter().map(|deadline| start.0 + deadline - t).chain([delay]);
+                let cuts = deadlines.iter().map(|deadline| start.0 + deadline - t);
+                let cuts = cuts.chain(sent.iter().map(|(begin, _)| begin - t));
                 let to = cuts.filter(|cut| *cut > at + same && *cut < end - same).fold(end, f64::min);
-                let u = if to <= delay + same { last } else { u };
+                let acts = |(begin, _): &&(f64, Vec<f64>)| begin - t < to - same;
+                let u = sent.iter().rfind(acts).map_or(&[][..], |(_, u)| u);
                 let (states, points) = x.split_at_mut(plant.state_dim());
                 plant.rk4_step(states, u, to - at)?;
                 for point in points.chunks_exact_mut(4) {
@@ -178,7 +181,8 @@ pub fn run(
     let (states, inputs) = (setting.plant.state_dim(), setting.plant.input_dim());
     let (t0, x0) = setting.start;
     let mut x = x0.to_vec();
-    let (mut u_ref, mut u, mut last) = (vec![0.0; inputs], vec![0.0; inputs], vec![0.0; inputs]);
+    let (mut u_ref, mut u) = (vec![0.0; inputs], vec![0.0; inputs]);
+    let mut sent = VecDeque::from([(f64::NEG_INFINITY, u.clone())]);
     let count = setting.deadlines.len();
     let judge = |deadline: &f64| Judge::new(Some(*deadline), Interpolation::Straight);
     let run = Run {
@@ -204,8 +208,11 @@ pub fn run(
         if lost || k == setting.schedule.steps || !x.iter().all(|x| x.is_finite()) {
             break;
         }
-        running.advance(filter, t, &mut x, [&last, &u])?;
-        last.copy_from_slice(&u);
+        sent.push_back((t + setting.delay, u.clone()));
+        while sent.get(1).is_some_and(|(begin, _)| *begin <= t + 1e-9 * step) {
+            sent.pop_front();
+        }
+        running.advance(filter, t, &mut x, &sent)?;
     }
     let mut run = running.run;
     for (seen, judge) in run.barriers.iter_mut().zip(&running.judges) {

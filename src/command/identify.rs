@@ -246,13 +246,6 @@ fn verdict(proposal: &Proposal) -> String {
     if let Some(alone) = proposal.difference.sentence() {
         sentences.push(format!("Alone, {alone}."));
     }
-    if let Some(delay) = proposal.long_delay {
-        sentences.push(format!(
-            "A delay of {} s fits best, but one of more than a step cannot be declared: the lines explain it otherwise, and a \
-             longer step_size would need less.",
-            number(delay)
-        ));
-    }
     sentences.push(if proposal.explained == proposal.holds {
         format!("Together the lines explain all {} holds.", proposal.holds)
     } else {

@@ -17,11 +17,11 @@ pub(super) struct RobustnessReport {
     gains: Vec<(String, f64)>,
     /// By input: the time constant in s with which it may be followed.
     lags: Vec<(String, f64)>,
-    /// The time in s by which inputs may be late, at most a step; `null` if a delay is declared.
+    /// The time in s by which inputs may be late, at most 16 steps; `null` if a delay is declared.
     delay: Option<f64>,
-    /// Whether that is a whole step, the most that can be declared.
+    /// The same in steps.
     #[serde(skip)]
-    is_step: bool,
+    steps: f64,
 }
 
 impl RobustnessReport {
@@ -40,7 +40,7 @@ impl RobustnessReport {
             gains: by_input(&bears.gains),
             lags: by_input(&bears.lags),
             delay: bears.delay,
-            is_step: bears.delay.is_some_and(|delay| delay >= c.experiment.step_size * (1.0 - 1e-9)),
+            steps: bears.delay.map_or(0.0, |delay| delay / c.experiment.step_size),
         }
     }
 
@@ -60,8 +60,12 @@ impl RobustnessReport {
             )
         };
         let delay = self.delay.map(|delay| {
-            let most = if self.is_step { ", a step" } else { "" };
-            format!("; delay {}{most}", rounded(1e3 * delay, "ms"))
+            let steps = match (self.steps + 1e-9) as u32 {
+                0 => String::new(),
+                1 => ", a step".to_owned(),
+                steps => format!(", {steps} steps"),
+            };
+            format!("; delay {}{steps}", rounded(1e3 * delay, "ms"))
         });
         format!(
             "it bears at least, each alone and declared: rates {};\n  measurement errors {};\n  inputs {} too much or less; lags {}{}",

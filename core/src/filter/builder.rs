@@ -7,7 +7,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use super::rows::{self, BarrierSlot, MeasurementErrors, Rows, Scratch, SharedPlants, Workspace};
-use super::{BarrierSettings, Begin, End, Filter, FilterState, Report, Sampling, Strictness};
+use super::{BarrierSettings, Begin, End, Filter, FilterState, MOST_LATE, Report, Sampling, Strictness};
 use crate::barrier::Barrier;
 use crate::convergence::condition::Condition;
 use crate::convergence::profile::Profile;
@@ -387,9 +387,9 @@ impl<P, const NX: usize, const NU: usize> FilterBuilder<P, NX, NU> {
     /// Sets the time in s, finite, ≥ 0, from a sample until its input acts: one communication step under a master that first
     /// exchanges all values (Jacobi). Default: 0.
     ///
-    /// Until then the input of the previous step is assumed to act; before the first, 0 or the nearest admissible input. So
-    /// the delay must not exceed the sampling period. The constraint is enforced from the predicted state at t + delay on.
-    /// In every barrier report all values but [`h`](super::BarrierReport::h) refer to that time. Deadlines count from the
+    /// Until then the inputs of earlier samples act, one after another; before the first, 0 or the nearest admissible input. The
+    /// delay may span up to 250 samples: at more of them than a filter [remembers](super::MAX_SENT) nothing is guaranteed. The
+    /// constraint is enforced from the predicted state at t + delay on. In every barrier report all values but [`h`](super::BarrierReport::h) refer to that time. Deadlines count from the
     /// first sample itself.
     ///
     /// # Errors
@@ -424,11 +424,22 @@ impl<P, const NX: usize, const NU: usize> FilterBuilder<P, NX, NU> {
     /// # Errors
     ///
     /// No barrier, or more than [`MAX_ROWS`]; no state or input, or more than [`MAX_INPUTS`] inputs. An actuation delay that
-    /// exceeds a given sampling period, or over which a source cannot predict. Measurement errors with a delay, without a
+    /// spans more than 250 given sampling periods or a deadline, or over which a source cannot predict. Measurement errors with a delay, without a
     /// prediction over the period, with a method that does not allow for them, or with a source that gives no derivatives
     /// along a direction.
     pub fn build(self) -> Result<Filter, Error> {
         self.parts.build()
+    }
+}
+
+/// Checks that an input that is `delay` s late can act before a `deadline`.
+pub(super) fn check_deadline(deadline: f64, delay: f64) -> Result<(), Error> {
+    match deadline <= delay {
+        true => {
+            let message = format!("is {deadline}, must be > actuation_delay = {delay}: no input acts before");
+            Err(Error::new(ErrorKind::Range, "deadline", message))
+        }
+        false => Ok(()),
     }
 }
 
@@ -534,12 +545,19 @@ impl Parts {
         if input_dim == 0 || input_dim > MAX_INPUTS {
             return dimension("u", format!("has {input_dim} components, must have 1 to {MAX_INPUTS}"));
         }
-        // The delay has to be within the period, and every source has to predict over it.
-        if let Sampling::Period(period) = sampling
-            && delay > period
+        let deadlines = slots.iter().map(|slot| slot.promise.deadline());
+        let first_period = sampling.first(deadlines.fold(f64::INFINITY, f64::min));
+        // The inputs on their way are remembered, and every source has to predict over the delay.
+        let period = if let Sampling::Period(period) = sampling { period } else { first_period };
+        let sent = delay / period;
+        if sent > MOST_LATE
+            && let Sampling::Period(_) = sampling
         {
-            let message = format!("is {delay}, must be <= sampling_period = {period}");
+            let message = format!("is {delay}, must be <= {MOST_LATE} times sampling_period = {period}");
             return Err(Error::new(ErrorKind::Range, "actuation_delay", message));
+        }
+        for slot in &slots {
+            check_deadline(slot.promise.deadline(), delay).map_err(|e| e.within(&slot.name))?;
         }
         if delay > 0.0
             && let Some(slot) = slots.iter().find(|slot| slot.source.predict().is_none())
@@ -558,7 +576,9 @@ impl Parts {
         }
         // State and workspace, allocated once: a step does not allocate.
         let barriers = vec![FixedTimeState::default(); slots.len()];
-        let state = FilterState { barriers, ..FilterState::default() };
+        let room = if delay > 0.0 { sent.min(MOST_LATE) as usize + 3 } else { 0 };
+        let sent = Vec::with_capacity(room);
+        let state = FilterState { barriers, sent, ..FilterState::default() };
         let workspace = Workspace {
             rows: vec![Row::ZERO; MAX_ROWS],
             enforcement: vec![Enforcement::Hard { priority: 0 }; MAX_ROWS],
@@ -569,8 +589,6 @@ impl Parts {
             search: Scratch::new(SharedPlants::of(&mut slots)),
             qp: qp::Workspace::new(),
         };
-        let deadlines = slots.iter().map(|slot| slot.promise.deadline());
-        let first_period = sampling.first(deadlines.fold(f64::INFINITY, f64::min));
         let rows = Rows {
             state_dim,
             measured,

@@ -34,7 +34,8 @@ pub use integrator::Integration;
 pub use report::{BarrierReport, Report, Status};
 pub use rows::{BarrierDerivative, Begin, Curvature, End, NoDerivative, SampleDerivative, Strictness};
 pub use sampling::Sampling;
-pub use state::FilterState;
+use state::MOST_LATE;
+pub use state::{FilterState, MAX_SENT, Sent};
 
 use alloc::boxed::Box;
 
@@ -201,6 +202,9 @@ impl Filter {
         let inside = self.backup.as_ref().map(|_| core::array::from_fn(|i| u.get(i).copied().unwrap_or(0.0)));
         if let Some(own) = integrator {
             rows.workspace.next.integrated = own.finish(rows.state.integrated, hold, u);
+        }
+        if rows.delay > 0.0 && t.is_finite() {
+            rows.workspace.next.send(t, rows.delay, u);
         }
         #[cfg(feature = "plan")]
         if let (Some(backup), Some(inside)) = (&mut self.backup, inside) {
@@ -391,9 +395,14 @@ impl Filter {
     ///
     /// # Errors
     ///
-    /// A state with another number of barriers; a plan of another filter, or one that is damaged.
+    /// A state with another number of barriers; more inputs on their way than [`MAX_SENT`]; a plan of another filter, or one
+    /// that is damaged.
     pub fn restore(&mut self, state: &FilterState) -> Result<(), Error> {
         length("barriers", state.barriers.len(), self.rows.slots.len())?;
+        if state.sent.len() > MAX_SENT {
+            let message = format!("has {} entries, must have at most {MAX_SENT}", state.sent.len());
+            return Err(Error::new(ErrorKind::Dimension, "sent", message));
+        }
         #[cfg(feature = "plan")]
         if let Some(backup) = &self.backup {
             backup.check(&self.rows, state)?;
@@ -446,11 +455,14 @@ impl Filter {
     ///
     /// # Errors
     ///
-    /// No such barrier; a deadline out of range; a filter with plans.
+    /// No such barrier; a deadline out of range, or within the actuation delay; a filter with plans.
     pub fn set_deadline(&mut self, index: usize, deadline: f64) -> Result<(), Error> {
+        let delay = self.rows.delay;
         let slot = self.replaced("deadline", index)?;
         let named = |e: Error| e.within(&slot.name);
-        slot.promise = slot.promise.clone().with_deadline(deadline).map_err(named)?;
+        let promise = slot.promise.clone().with_deadline(deadline).map_err(named)?;
+        builder::check_deadline(deadline, delay).map_err(named)?;
+        slot.promise = promise;
         slot.begin = Begin::AtOnce;
         self.rows.state.barriers[index] = FixedTimeState::default();
         Ok(())

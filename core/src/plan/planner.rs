@@ -587,16 +587,29 @@ impl<'a> Planner<'a> {
     /// # Errors
     ///
     /// Why it fails.
-    pub(crate) fn holds(&self, t: f64, x: &[f64], u: &[f64]) -> Result<(), Failure> {
-        let grid = Grid { period: self.period, even: true };
+    pub(crate) fn holds(
+        &self,
+        t: f64,
+        x: &[f64],
+        inputs: &[(f64, [f64; MAX_INPUTS])],
+    ) -> Result<(), Failure> {
+        let grid = Grid { period: self.period, even: false };
         let mut walk =
             Walk::new(self.model(self.pace()), self.tolerances, self.requirements, 1.0, grid, (t, x))?;
         if let Some(uncertain) = self.uncertain {
             let measured = Uncertain { measured: None, ..uncertain };
             walk = walk.within(self.measured(measured)?.0)?;
-            return walk.hold_in_tube(u, None, t + self.period);
         }
-        walk.hold_until(u, t + self.period)
+        let mut end = t;
+        for (dt, u) in inputs {
+            end += dt;
+            let u = &u[..self.dims[1]];
+            match self.uncertain {
+                Some(_) => walk.hold_in_tube(u, None, end)?,
+                None => walk.hold_until(u, end)?,
+            }
+        }
+        Ok(())
     }
 
     /// Runs the plant from `x` until the next sample, under `u`, to round-off.

@@ -273,7 +273,9 @@ where
 {
     let Declared { rates, errors, gains, lags, delay, jitter } = declared;
     let (mut draws, mut filter) = (Draws(how.seed), case.filter(plant.clone(), Some(declared)));
-    let (mut x, mut acting, mut late) = (case.x, [0.0; 2], [0.0; 2]);
+    let (mut x, mut late) = (case.x, [0.0; 2]);
+    // When each input begins to act.
+    let mut sent = vec![(f64::NEG_INFINITY, [0.0; 2])];
     let mut sides = Sides::of(|| draws.sign());
     let mut outcome = Outcome { least: f64::INFINITY, ..Outcome::default() };
     let mut next = 0.0;
@@ -320,7 +322,7 @@ where
         }
         outcome.passed += usize::from(matches!(assurance.driver, Driver::Reference | Driver::Eased));
         let guaranteed: Vec<bool> = report.barriers.iter().map(|b| b.guaranteed).collect();
-        let before = core::mem::replace(&mut acting, u);
+        sent.push((t + delay, u));
         let rate = |x: &[f64; 4], u: &[f64; 2]| {
             let arrives: [f64; 2] = core::array::from_fn(|i| {
                 let [low, high] = gains[i];
@@ -329,9 +331,20 @@ where
             let rate = plant.derivative(x, &arrives);
             core::array::from_fn::<f64, 4, _>(|i| rate[i] + how.worse * rates[i] * sides.rates[i])
         };
-        for part in 0..PARTS {
-            let h = period / f64::from(PARTS);
-            let asked = if (f64::from(part) + 0.5) * h < *delay { &before } else { &u };
+        // Parts of the period, and where another input begins to act.
+        let mut ends: Vec<f64> =
+            (1..=PARTS).map(|part| t + period * f64::from(part) / f64::from(PARTS)).collect();
+        ends.extend(sent.iter().map(|(at, _)| *at).filter(|at| *at > t + 1e-9 && *at < next - 1e-9));
+        ends.sort_by(f64::total_cmp);
+        let mut begin = t;
+        for now in ends {
+            let h = now - begin;
+            let acts = |(at, _): &&(f64, [f64; 2])| *at <= begin + 0.5 * h;
+            let asked = sent.iter().rfind(acts).unwrap().1;
+            if h <= 0.0 {
+                continue;
+            }
+            begin = now;
             let follow = |late: &mut [f64; 2]| {
                 for i in 0..2 {
                     let [low, high] = lags[i];
@@ -353,7 +366,6 @@ where
             let k3 = rate(&moved([(-1.0, &k1), (2.0, &k2)]), u);
             x = core::array::from_fn(|i| x[i] + h / 6.0 * (k1[i] + 4.0 * k2[i] + k3[i]));
             follow(&mut late);
-            let now = t + h * f64::from(part + 1);
             for (j, (h, guaranteed)) in case.h(&x).into_iter().zip(&guaranteed).enumerate() {
                 if *guaranteed && (j > 0 || now >= DEADLINE) {
                     outcome.least = outcome.least.min(h);

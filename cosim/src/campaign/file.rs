@@ -647,8 +647,8 @@ pub struct Declared {
     pub plant: usize,
     /// Whether its outputs are read a step late.
     pub late: bool,
-    /// Whether the input of a sample acts later than that sample.
-    pub delayed: bool,
+    /// How many steps after its sample an input begins to act, a part of one counted as one.
+    pub delayed: usize,
 }
 
 /// Lets the plants of all filters that declare something deviate within that.

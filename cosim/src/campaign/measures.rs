@@ -28,8 +28,8 @@ struct DeclaredPlan {
     plant: String,
     /// Whether its outputs are read a step late.
     late: bool,
-    /// Whether the phase in its report is that of an instant after the sample.
-    delayed: bool,
+    /// The number of steps by which the instant of the phase in its report comes after the sample, or fewer.
+    delayed: usize,
 }
 
 /// A barrier of a filter.
@@ -64,9 +64,9 @@ struct Seen {
 #[derive(Clone, Debug)]
 struct Promised {
     /// Whether a plan guaranteed it, as read at the last communication points; the latest first.
-    guaranteed: [bool; READ],
+    guaranteed: Vec<bool>,
     /// Whether h ≥ 0 was required from then on, as read there.
-    required: [bool; READ],
+    required: Vec<bool>,
     /// Whether it was ever guaranteed.
     given: bool,
     /// Whether it was guaranteed at all samples since, until it was released.
@@ -76,9 +76,6 @@ struct Promised {
     /// The largest size of h.
     size: f64,
 }
-
-/// The number of communication points whose reports are remembered.
-const READ: usize = 3;
 
 /// Part of the largest size of h by which h may lie below 0: what the integration of the plant may be off by.
 const TOLERANCE: f64 = 1e-7;
@@ -111,9 +108,10 @@ impl Fate {
 }
 
 impl Promised {
-    fn nothing() -> Self {
-        let none = [false; READ];
-        Self { guaranteed: none, required: none, given: false, stays: true, least: None, size: 0.0 }
+    /// Before the first communication point of a filter that is read, and whose inputs act, up to `late` steps late.
+    fn nothing(late: usize) -> Self {
+        let none = vec![false; late + 1];
+        Self { guaranteed: none.clone(), required: none, given: false, stays: true, least: None, size: 0.0 }
     }
 
     /// Takes the values of a communication point: whether a plan guarantees it, its phase, and the least h over the step before.
@@ -129,7 +127,7 @@ impl Promised {
         // The sample at the start of the step before is read here, or was at the point before. The phase is of a later instant
         // with a delay, and then that of the sample before it is of one before the step.
         let at = usize::from(!of.late);
-        if !is_first && self.guaranteed[at] && self.required[at + usize::from(of.delayed)] {
+        if !is_first && self.guaranteed[at] && self.required[at + of.delayed] {
             self.least = Some(self.least.map_or(least, |before| before.min(least)));
         }
     }
@@ -262,10 +260,9 @@ impl Measures {
             counts: [0; Status::ALL.len()],
             assurance_statuses: [0; AssuranceStatus::ALL.len()],
             peaks: vec![0.0; filter.inputs.len()],
-            promised: vec![
-                Promised::nothing();
-                if filter.declared.is_some() { filter.barriers.len() } else { 0 }
-            ],
+            promised: filter.declared.as_ref().map_or_else(Vec::new, |declared| {
+                vec![Promised::nothing(declared.delayed + 1); filter.barriers.len()]
+            }),
             points: 0,
         };
         self.filters.iter().map(nothing).collect()

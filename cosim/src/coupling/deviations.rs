@@ -21,8 +21,8 @@ pub struct Drawn {
     pub configuration: PlantConfiguration,
     /// Whether the outputs of the filter are read a step late.
     pub late: bool,
-    /// Whether the input of a sample acts later than that sample.
-    pub delayed: bool,
+    /// How many steps after its sample an input begins to act, a part of one counted as one.
+    pub delayed: usize,
     /// That delay in s.
     pub delay: f64,
 }
@@ -219,7 +219,7 @@ pub fn deviations(
             plant: p,
             configuration: plant.clone().deviating(Deviation::of(&filter, step, acts)),
             late: acts > 0.0,
-            delayed: filter.actuation_delay > 0.0,
+            delayed: (filter.actuation_delay / step * (1.0 - 1e-9)).ceil() as usize,
             delay: filter.actuation_delay,
         });
     }

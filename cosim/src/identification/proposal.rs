@@ -10,7 +10,7 @@ use super::fit::Fitting;
 use super::linear::Predictor;
 use super::membership::{self, Bounds};
 use super::record::Record;
-use super::search::{DEVIATIONS, Sought, Spread, fit};
+use super::search::{DEVIATIONS, Spread, fit};
 use super::sizes::{Program, Sizes, worst};
 use super::windows::Windows;
 use crate::error::Error;
@@ -101,8 +101,6 @@ pub struct Proposal {
     pub ranges: Vec<(String, [f64; 2], String)>,
     /// What the difference looks like.
     pub difference: Difference,
-    /// The best delay in s, if it is longer than can be declared.
-    pub long_delay: Option<f64>,
     /// By input, the part of its bounds that was used.
     pub excited: Vec<(String, f64)>,
     /// What the user should know of the recording.
@@ -122,12 +120,7 @@ pub fn identify(c: &FilterConfiguration, record: &Record, factor: f64) -> Result
     let mut notes = record.notes.clone();
     // Delay, lags and gains.
     let longest = super::longest(record, c.experiment.step_size);
-    let (mut arrival, mut spread) = fit(&model, record, longest)?;
-    let long_delay = Some(arrival.delay).filter(|delay| *delay > 1.001 * c.experiment.step_size);
-    if long_delay.is_some() {
-        let sought = Sought { delay: c.experiment.step_size, ..longest };
-        (arrival, spread) = fit(&model, record, sought)?;
-    }
+    let (mut arrival, spread) = fit(&model, record, longest)?;
     for (input, gain) in record.inputs.iter().zip(&mut arrival.gains) {
         if *gain < LEAST_GAIN {
             notes.push(format!(
@@ -190,7 +183,6 @@ pub fn identify(c: &FilterConfiguration, record: &Record, factor: f64) -> Result
             .map(|(i, s)| (s.name.clone(), record.state_range(i), s.unit.clone()))
             .collect(),
         difference: difference(c, record)?,
-        long_delay,
         excited: record.inputs.iter().enumerate().map(used).collect(),
         notes,
     })

@@ -209,7 +209,7 @@ fn combinations_are_taken_apart() {
     for seed in 0..16 {
         let gain = draw(0.8, 1.1);
         let planted = Planted {
-            delay: STEP * [0.0, 1.0][seed % 2],
+            delay: STEP * [0.0, 1.0, 2.5][seed % 3],
             lag: [0.0, draw(0.03, 0.2)][seed / 2 % 2],
             gain: [gain; 2],
             wind: [draw(-0.2, 0.2), draw(0.0, 0.1)],
@@ -237,13 +237,15 @@ fn combinations_are_taken_apart() {
     }
 }
 
-/// A delay of more than a step cannot be declared: it is told, and the rest is explained otherwise.
+/// A delay of several steps, or a part of one, is all that there is to declare.
 #[test]
-fn a_long_delay_is_told() {
-    let proposal = proposed(Planted { delay: 0.06, ..NOTHING }, 600, 2, 1.2);
-    let long = proposal.long_delay.expect("a delay of three steps");
-    assert!((long - 0.06).abs() < 1e-3 * STEP, "{long}");
-    assert!(declared(&proposal, Kind::Delay, "").is_none_or(|delay| delay[1] <= STEP), "{proposal:#?}");
+fn a_long_delay_is_declared() {
+    for steps in [3.0, 7.4] {
+        let proposal = proposed(Planted { delay: steps * STEP, ..NOTHING }, 600, 2, 1.2);
+        let [_, delay] = declared(&proposal, Kind::Delay, "").expect("a delay");
+        assert!((delay - steps * STEP).abs() < 1e-3 * STEP, "{delay}");
+        assert!(proposal.findings.len() == 1 && proposal.explained == proposal.holds, "{proposal:#?}");
+    }
 }
 
 /// The parameter that differs is named before a gain, which explains less.

@@ -9,6 +9,9 @@ use crate::configuration::{ConfigurationError, Deviation, DeviationKind, UNBOUND
 
 /// Part of an interval by which the time may fall short of its start, for round-off in the importer's time.
 const ROUND_OFF: f64 = 1e-6;
+/// The shortest step of a plant whose steps are drawn, as a part of the usual one; and the most inputs that it remembers.
+const SHORTEST: f64 = 0.2;
+const MOST_ASKED: f64 = 2000.0;
 /// The longest time for which a deviation stays as it is, if it changes, in steps.
 const LONGEST: f64 = 500.0;
 
@@ -40,10 +43,13 @@ pub(super) struct Deviating {
     filter: Filter,
     /// Bounds of the inputs.
     bounds: Vec<[f64; 2]>,
-    /// What was asked before the step, and what has arrived of it.
+    /// What has arrived of each input; then the inputs that were asked, the oldest first, each after the time in s at which it
+    /// begins to act.
     memory: Vec<f64>,
     /// Buffer: the same within the step.
     next: Vec<f64>,
+    /// When the step began, in s.
+    begun: f64,
     /// The least h of each barrier over the last step, its ends included; before the first step, h at the start.
     least: Vec<f64>,
     h: Vec<f64>,
@@ -62,6 +68,7 @@ impl Deviating {
             bounds,
             memory: Vec::new(),
             next: Vec::new(),
+            begun: 0.0,
             least: barriers.clone(),
             h: barriers,
         };
@@ -73,8 +80,11 @@ impl Deviating {
     /// What acts before the first step: the admissible input nearest 0, asked and arrived.
     fn rest(&self) -> Vec<f64> {
         // Not `clamp`, which panics if the bounds contradict each other.
-        let rest = self.bounds.iter().map(|[min, max]| 0.0_f64.max(*min).min(*max));
-        rest.clone().chain(rest).collect()
+        let rest: Vec<f64> = self.bounds.iter().map(|[min, max]| 0.0_f64.max(*min).min(*max)).collect();
+        let asked = (self.of.delay / (SHORTEST * self.of.step)).min(MOST_ASKED) as usize + 2;
+        let always = core::iter::once(f64::MIN).chain(rest.iter().copied());
+        let asked = core::iter::repeat_n(always, asked).flatten();
+        rest.iter().copied().chain(asked).collect()
     }
 
     /// Returns to before the first step, in the state `x` at time `t` (s).
@@ -112,6 +122,7 @@ impl Deviating {
     /// Begins a step from the state `x` at time `t` (s).
     pub(super) fn begin_step(&mut self, t: f64, x: &[f64]) {
         self.next.copy_from_slice(&self.memory);
+        self.begun = t;
         self.least.fill(f64::INFINITY);
         self.see(t, x);
     }
@@ -119,29 +130,35 @@ impl Deviating {
     /// Ends a step under the inputs `u` that were asked, and remembers it.
     pub(super) fn end_step(&mut self, u: &[f64]) {
         std::mem::swap(&mut self.memory, &mut self.next);
-        self.memory[..u.len()].copy_from_slice(u);
+        let (_, asked) = self.memory.split_at_mut(u.len());
+        asked.rotate_left(1 + u.len());
+        let last = asked.len() - u.len();
+        asked[last - 1] = self.begun + self.of.delay;
+        asked[last..].copy_from_slice(u);
     }
 
-    /// Moves the state `x` for `dt` s from the time `t` (s), which is `since` s after the start of the step, under the inputs
-    /// `u` that are asked in the step. `advance` is the motion of the model under an input.
+    /// Moves the state `x` for `dt` s from the time `t` (s) under the inputs `u` that are asked in the step. `advance` is the
+    /// motion of the model under an input.
     pub(super) fn advance(
         &mut self,
-        (t, since, dt): (f64, f64, f64),
+        (t, dt): (f64, f64),
         u: &[f64],
         x: &mut [f64],
         acting: &mut [f64],
         advance: impl FnOnce(&mut [f64], &[f64]) -> Result<(), punctual_core::Error>,
     ) -> Result<(), punctual_core::Error> {
         let (inputs, middle) = (u.len(), t + 0.5 * dt);
-        let is_late = since + 0.5 * dt < self.of.delay;
+        let (_, asked) = self.memory.split_at(inputs);
+        let before = asked.chunks_exact(1 + inputs).rfind(|asked| asked[0] <= middle);
+        let is_late = middle < self.begun + self.of.delay;
         for i in 0..inputs {
-            let asked = if is_late { self.next[i] } else { u[i] };
+            let asked = before.filter(|_| is_late).map_or(u[i], |asked| asked[1 + i]);
             let within = |[low, high]: [f64; 2], side: f64| 0.5 * (low + high) + 0.5 * (high - low) * side;
             let lag = within(self.of.lags[i], self.drawn(Of::Lag, i, middle));
             // What arrives follows for half of the time before the input in its middle, and for half after it.
             let follow = if lag > 0.0 { elementary::exp(-0.5 * dt / lag) } else { 0.0 };
-            let arrived = asked + (self.next[inputs + i] - asked) * follow;
-            self.next[inputs + i] = asked + (arrived - asked) * follow;
+            let arrived = asked + (self.next[i] - asked) * follow;
+            self.next[i] = asked + (arrived - asked) * follow;
             acting[i] = within(self.of.gains[i], self.drawn(Of::Gain, i, middle)) * arrived;
         }
         // Half of what is added to the rates before the motion of the model, half after it.
@@ -255,9 +272,9 @@ deadline = 6.0
             let t = STEP * k as f64;
             deviating.begin_step(t, &x);
             for part in 0..100 {
-                let since = INNER * f64::from(part);
+                let now = t + INNER * f64::from(part);
                 let advance = |x: &mut [f64], u: &[f64]| plant.rk4_step(x, u, INNER);
-                deviating.advance((t + since, since, INNER), &u, &mut x, &mut acting, advance).unwrap();
+                deviating.advance((now, INNER), &u, &mut x, &mut acting, advance).unwrap();
             }
             deviating.end_step(&u);
             x
@@ -321,12 +338,18 @@ deadline = 6.0
         }
     }
 
-    /// Until the delay has passed, the input of the step before acts, at first 0. What the coupling takes is no delay of the plant.
+    /// Until the delay has passed, inputs of steps before act, at first 0. What the coupling takes is no delay of the plant.
     #[test]
-    fn a_delay_holds_the_input_before() {
+    fn a_delay_holds_the_inputs_before() {
         let of = deviation("actuation_delay = 0.04", DeviationKind::Corners, 1.0, 0.0);
         let x = moved(&of, [2.0, 0.0], 2);
         assert!((x[0][2] - 2.0 * 0.06).abs() < 1e-12 && (x[1][2] - 2.0 * 0.16).abs() < 1e-12, "{x:?}");
+        // Two steps and a half.
+        let of = deviation("actuation_delay = 0.25", DeviationKind::Corners, 1.0, 0.0);
+        let x = moved(&of, [2.0, 0.0], 5);
+        for (x, acted) in x.iter().zip([0.0, 0.0, 0.05, 0.15, 0.25]) {
+            assert!((x[2] - 2.0 * acted).abs() < 1e-12, "{x:?}");
+        }
         assert_eq!(deviation("actuation_delay = 0.1", DeviationKind::Corners, 1.0, 0.1).delay, 0.0);
         assert_eq!(deviation("actuation_delay = 0.1", DeviationKind::Corners, 1.0, 0.0).delay, 0.1);
     }

@@ -188,7 +188,7 @@ impl Block for PlantBlock {
             match &mut self.deviating {
                 None => self.plant.rk4_step(&mut self.next, held, inner).map_err(|e| in_words(&e))?,
                 Some(deviating) => {
-                    let time = (t + k * inner, k * inner, inner);
+                    let time = (t + k * inner, inner);
                     let advance = |x: &mut [f64], u: &[f64]| self.plant.rk4_step(x, u, inner);
                     let moved = deviating.advance(time, u, &mut self.next, &mut self.acting, advance);
                     moved.map_err(|e| in_words(&e))?;

@@ -205,7 +205,7 @@ pub(super) static SECTION: Section = Section {
                 Some("`auto`"),
                 "`on`: the filter promises only what a plan within the bounds keeps, whatever u_ref is, and follows it where it \
                  must ([guarantees](guarantees.md#will-it-always)). The plan is sought at the first step; if none is found, \
-                 nothing is promised. Needs a model to run ahead, sets that stay where they are, a delay of at most a step. `off`: the rows \
+                 nothing is promised. Needs a model to run ahead, sets that stay where they are, a delay of at most 250 steps. `off`: the rows \
                  alone. `auto`: `on` where that is possible and every input has bounds, else `off`. Where every input has bounds, a \
                  warning names the keys that switch it off for all barriers",
             ),
@@ -231,8 +231,9 @@ pub(super) static SECTION: Section = Section {
                 "actuation_delay",
                 Number(Is("s"), Range::NON_NEGATIVE),
                 Some("0"),
-                "at most the step size: until a computed input acts, such as a step with a [Jacobi master](fmu.md#jacobi), for \
-                 which `build --master jacobi` and `run` set it. The state is predicted over it",
+                "until a computed input acts: the time that a camera, a computation and a network take, or a step with a [Jacobi \
+                 master](fmu.md#jacobi), for which `build --master jacobi` and `run` set it. At most 250 steps; less than every \
+                 deadline. The state is predicted over it",
             ),
             Key::new(
                 "period_max",
@@ -536,7 +537,8 @@ impl FilterConfiguration {
         }));
         if self.may_be_late() {
             let names = ("actuation_delay".to_owned(), "actuation_delay".to_owned());
-            let description = "time until u acts, at most a step: a step with a master that exchanges all values first (Jacobi)";
+            let description =
+                "time until u acts: a step with a master that exchanges all values first (Jacobi)";
             rows.push(Parameter::new(names, "s", Range::NON_NEGATIVE, description, |c: &mut Self| {
                 Some(&mut c.actuation_delay)
             }));

@@ -25,8 +25,8 @@ pub struct Bears {
     pub gains: Vec<f64>,
     /// The time constant in s with which each input may be followed.
     pub lags: Vec<f64>,
-    /// How long in s after its sample an input may act: up to the period of the samples, since plans account for no longer
-    /// delay. `None` if a delay is declared.
+    /// How long in s after its sample an input may act: at most 16 periods, the longest that is tried. `None` if a delay is
+    /// declared.
     pub delay: Option<f64>,
 }
 
@@ -213,7 +213,7 @@ impl Planning<'_> {
     fn cautious(&self, first: &First, at: (f64, f64), x: &[f64]) -> Plan {
         let First { promises, plan, .. } = first;
         let end = plan.backup_plan.inputs.last().map_or(at.0, |(end, _)| *end);
-        let way = self.along(&plan.backup_plan, at.0, x, (end - at.0) / PLACES as f64);
+        let way = self.along(&plan.backup_plan.inputs, at.0, x, (end - at.0) / PLACES as f64);
         let places = way.iter().step_by(way.len().div_ceil(PLACES).max(1));
         let mut gradient = x.to_vec();
         let mut change = |model: &dyn Predict| {
@@ -240,25 +240,29 @@ impl Planning<'_> {
 
     /// The longest of a few delays, in s, with which `plan` from `x` at `t` is kept if it begins that much later.
     fn delay_borne(&self, promises: &[Option<Promise>], plan: &Plan, (t, x): (f64, &[f64])) -> f64 {
-        let acting = self.rows.acting();
+        // Until then nothing changes.
+        let u = self.rows.state.acting_at(&self.rows.bounds, t);
         let keeps = |delay: &f64| {
-            let mut state = x.to_vec();
+            let (mut state, acting) = (x.to_vec(), [(*delay, u)]);
             let run = |planner: &Planner<'_>| {
-                planner.run(&mut state, &acting[..self.rows.input_dim]);
+                planner.run(&mut state, &u[..self.rows.input_dim]);
                 Ok(())
             };
             let is_run = self.planned(promises, (t, *delay), &[], run).is_ok();
             let mut later = plan.clone();
             later.backup_plan.inputs.iter_mut().for_each(|(end, _)| *end += delay);
             let bears = |planner: &Planner<'_>| {
-                planner.delayed(*delay, t, x).any_bears(&later, HOLDS, t + delay, &state)
+                planner.delayed(&acting, t, x).any_bears(&later, HOLDS, t + delay, &state)
             };
             is_run
-                && self.waits(promises, (t, x), t + delay).is_ok()
+                && self.waits(promises, (t, x), &acting).is_ok()
                 && self.planned(promises, (t + delay, self.plans.period), &[], bears).is_ok()
         };
-        let parts = [1.0, 0.5, 0.25].map(|part| part * self.plans.period);
-        parts.into_iter().find(|delay| keeps(delay)).unwrap_or(0.0)
+        let parts = |parts: [f64; 4]| parts.map(|part| part * self.plans.period).into_iter();
+        match parts([2.0, 4.0, 8.0, 16.0]).take_while(keeps).last() {
+            Some(longest) => longest,
+            None => parts([1.0, 0.5, 0.25, 0.125]).find(keeps).unwrap_or(0.0),
+        }
     }
 }
 

@@ -109,11 +109,17 @@ impl Planning<'_> {
     ) -> Vec<(f64, Vec<f64>, [f64; MAX_INPUTS])> {
         let x = self.state(x);
         let (acts, begin) = self.acts(t, &x);
-        let mut trajectory = self.along(backup_plan, acts, &begin, step);
-        if acts > t {
-            trajectory.insert(0, (t, x, self.rows.acting()));
-        }
-        trajectory
+        let trajectory = self.along(&backup_plan.inputs, acts, &begin, step);
+        // What is on its way acts before.
+        let mut end = t;
+        let acting = self.rows.acting(t).filter(|_| acts > t).map(|(dt, u)| {
+            end += dt;
+            (end, u)
+        });
+        let mut before = self.along(&acting.collect::<Vec<_>>(), t, &x, step);
+        before.pop();
+        before.extend(trajectory);
+        before
     }
 
     /// [`Self::earliest_deadline`]; `first` was found for the deadlines themselves.
@@ -239,8 +245,12 @@ impl Planning<'_> {
     /// them, at most 1.
     pub(super) fn arrival(&self, promises: &[Option<Promise>], plan: &Plan, t: f64, x: &[f64]) -> f64 {
         let end = plan.backup_plan.inputs.last().map_or(t, |(end, _)| *end);
-        let trajectory =
-            self.along(&plan.backup_plan, t, x, self.plans.period.max((end - t) / DECISIONS.most_points));
+        let trajectory = self.along(
+            &plan.backup_plan.inputs,
+            t,
+            x,
+            self.plans.period.max((end - t) / DECISIONS.most_points),
+        );
         let mut part = 0.0_f64;
         for ((promise, slot), model) in promises.iter().zip(&self.rows.slots).zip(self.models()) {
             let Some(promise) = promise.filter(|p| p.from > t && slot.begin == Begin::AtOnce) else {

@@ -30,7 +30,7 @@ use alloc::vec::Vec;
 
 use super::integrator::Integrator;
 use super::rows::{BarrierSlot, Rows};
-use super::{Begin, End, Filter, FilterState, NoDerivative, SampleDerivative};
+use super::{Begin, End, Filter, FilterState, MOST_LATE, NoDerivative, SampleDerivative};
 use crate::MAX_INPUTS;
 use crate::error::{Error, ErrorKind, length, non_negative, positive};
 use crate::interval::Interval;
@@ -258,11 +258,11 @@ impl Filter {
     /// them keeps the promise. It then
     /// has an [end](Assurance::until), which is postponed again and again. If the plant
     /// was seen to differ from the model, and 1.5 times that difference could take it out of a set before the next sample,
-    /// the guarantee is lost for that sample. A sample may be repeated at the same time (not behind a delay), come early, or come late by a
+    /// the guarantee is lost for that sample. A sample may be repeated at the same time, come early, or come late by a
     /// twentieth of a hold. If the time to the next sample changes and is [known](Self::expect_hold), a plan is sought for
     /// the new one; if none is found, the guarantee is lost. A sample that comes later suspends it until the next one. While
     /// x is not finite, the plan continues as it is. A barrier without a deadline that [begins later](Begin::At) is promised
-    /// from then on. A filter with a bound on the disturbance of a barrier, a delay above the period, or a deadline for a barrier that begins
+    /// from then on. A filter with a bound on the disturbance of a barrier, a delay of more than 250 periods, or a deadline for a barrier that begins
     /// later cannot be assured yet, and is refused. Sets must not move, unless [it is
     /// known](crate::barrier::Barrier::range_from) how low h gets: at an equilibrium each set is checked at eight later
     /// times, up to a day, and no plan is found if it has moved. With a [horizon](Plans::horizon) they may move, and the
@@ -294,7 +294,7 @@ impl Filter {
     /// A number of `plans` out of range; a filter that already has plans. A filter that cannot be assured: a barrier without
     /// a model that can be run ahead, or with another plant than the first one; one with a deadline that begins later, one
     /// that begins on another's arrival, or without a horizon one that moves for ever; a bound on the disturbance of a barrier;
-    /// a delay above the period; an integrator, measured quantities beside the states, or a source without derivatives on enclosures for an
+    /// a delay of more than 250 periods; an integrator, measured quantities beside the states, or a source without derivatives on enclosures for an
     /// uncertain plant. [`Self::obstacles`] lists them all.
     pub fn with_plans(mut self, plans: impl Into<Plans>) -> Result<Self, Error> {
         let mut plans = plans.into();
@@ -336,8 +336,14 @@ impl Filter {
         let mut found = Vec::new();
         let rows = &self.rows;
         let refused = |field: &str, message: String| Error::new(ErrorKind::Unsupported, field, message);
-        if rows.delay > plans.period {
-            let message = format!("is {}, must be <= period = {} for a plan", rows.delay, plans.period);
+        let most = if plans.jitter > 0.0 { 1.0 } else { MOST_LATE };
+        if rows.delay > most * plans.period {
+            let (late, times) = match most > 1.0 {
+                true => ("", format!("{most} times ")),
+                false => (", where samples come late", String::new()),
+            };
+            let message =
+                format!("is {}, must be <= {times}period = {} for a plan{late}", rows.delay, plans.period);
             found.push(refused("actuation_delay", message));
         }
         let is_declared =

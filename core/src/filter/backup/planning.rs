@@ -13,8 +13,8 @@ use crate::filter::rows::{BarrierSlot, Rows};
 use crate::filter::{Begin, End, Integration, Strictness};
 use crate::lie::Predict;
 use crate::plan::{
-    BackupPlan, Course, Failure, Integral, Limit, Motion, Moving, Planner, Requirement, SETTINGS, TOLERANCES,
-    Uncertain, Uncertainty, highest, narrowed, slopes,
+    Course, Failure, Integral, Limit, Motion, Moving, Planner, Requirement, SETTINGS, TOLERANCES, Uncertain,
+    Uncertainty, highest, narrowed, slopes,
 };
 use crate::qp::Bounds;
 
@@ -68,11 +68,17 @@ impl<'a> Planning<'a> {
     /// Whether a sample at `t` comes in time. A measured clock may be late, unless a tube says where the plant is until then.
     pub(super) fn in_time(&self, t: f64, hold: f64) -> bool {
         let jitter = self.uncertainty.map_or(DECISIONS.jitter, |of| of.jitter.max(TOLERANCES.on_time));
-        // Behind a delay two inputs must not be on their way at once.
+        // Behind a delay, samples that are declared to come late must not send two inputs on their way at once.
         let (delay, slack) = (self.rows.delay, TOLERANCES.on_time * hold);
         let last = self.before().last_time().unwrap_or(f64::NEG_INFINITY);
-        let follows = delay == 0.0 || t - last >= delay - slack && hold >= delay - slack;
-        follows && self.before().in_time(t, hold, jitter)
+        let follows =
+            delay == 0.0 || !self.is_jittery() || t - last >= delay - slack && hold >= delay - slack;
+        follows && !self.rows.state.is_crowded() && self.before().in_time(t, hold, jitter)
+    }
+
+    /// Whether samples are declared to come late.
+    pub(super) fn is_jittery(&self) -> bool {
+        self.uncertainty.is_some_and(|of| of.jitter > 0.0)
     }
 
     /// The model's state for the measured `x`.
@@ -135,43 +141,47 @@ impl<'a> Planning<'a> {
     }
 
     /// When in s an input of a sample at `t` begins to act, and the model's state there: `x`, moved on by the delay under the
-    /// input that still acts. Plans begin there.
+    /// inputs that still act. Plans begin there.
     pub(super) fn acts(&self, t: f64, x: &[f64]) -> (f64, Vec<f64>) {
         let (mut x, delay) = (x.to_vec(), self.rows.delay);
         if delay > 0.0
             && let Some(plant) = self.plant()
         {
-            let (dims, u) = ([self.states, self.rows.input_dim], self.rows.acting());
-            Planner::new(plant, dims, self.bounds, &[], delay, 1.0).run(&mut x, &u[..dims[1]]);
+            let dims = [self.states, self.rows.input_dim];
+            for (dt, u) in self.rows.acting(t) {
+                Planner::new(plant, dims, self.bounds, &[], dt, 1.0).run(&mut x, &u[..dims[1]]);
+            }
         }
         (t + delay, x)
     }
 
-    /// What may arrive of each input at `t`, where the input of a sample begins to act: the least and the largest, if inputs
-    /// are followed late.
+    /// What may arrive of each input at a sample at `t`, the least and the largest, if inputs are followed late.
     pub(super) fn arriving(&self, t: f64) -> Vec<[f64; 2]> {
         let Some(of) = self.uncertainty.filter(|of| of.lags()) else { return Vec::new() };
-        let (PlanState { arrived, sample, .. }, asked) = (self.before(), self.rows.acting());
+        let (Rows { state, bounds, .. }, PlanState { arrived, sample, .. }) = (self.rows, self.before());
+        let none: [f64; MAX_INPUTS] = core::array::from_fn(|i| bounds.clamp(i, 0.0));
         // What arrived is known from sample to sample, and before the first input. Otherwise it is within its bounds.
-        let is_first = self.rows.state.time.is_none()
-            && self.rows.state.start.is_none()
-            && asked == core::array::from_fn(|i| self.rows.bounds.clamp(i, 0.0));
-        let since = match sample {
-            Some([last, _]) if !arrived.is_empty() => Some((t - last).max(0.0)),
-            _ => (arrived.is_empty() && is_first).then_some(0.0),
-        };
-        let arrives = |i: usize| {
-            let (asked, Some(since)) = (asked[i], since) else {
-                return [self.bounds.min[i], self.bounds.max[i]];
-            };
-            let [low, high] = arrived.get(i).copied().unwrap_or([asked; 2]).map(|arrived| arrived - asked);
-            let [least, largest] = of.remains(i, since, 0.0);
-            [asked + (low * least).min(low * largest), asked + (high * least).max(high * largest)]
-        };
-        (0..self.rows.input_dim).map(arrives).collect()
+        let is_first = state.time.is_none() && state.start.is_none() && state.acting_at(bounds, t) == none;
+        let (mut arriving, mut since) = (arrived.clone(), None);
+        match sample {
+            Some([last, _]) if !arrived.is_empty() => since = Some(last - self.rows.delay),
+            _ if arrived.is_empty() && is_first => arriving = none.map(|none| [none; 2]).to_vec(),
+            _ => arriving = self.bounds.min.iter().zip(&self.bounds.max).map(|(a, b)| [*a, *b]).collect(),
+        }
+        arriving.truncate(self.rows.input_dim);
+        for (dt, asked) in since.into_iter().flat_map(|last| state.acting(bounds, last, t - last)) {
+            for (i, (arrives, asked)) in arriving.iter_mut().zip(asked).enumerate() {
+                let [low, high] = arrives.map(|arrived| arrived - asked);
+                let [least, largest] = of.remains(i, dt, 0.0);
+                let low = asked + (low * least).min(low * largest);
+                *arrives = [low, asked + (high * least).max(high * largest)];
+            }
+        }
+        arriving
     }
 
-    /// Whether `promises` that begin at `acts` are kept from the sample (its time and state) on until then.
+    /// Whether `promises` that begin once all of `acting` has acted, each for its time in s, are kept from the sample (its time
+    /// and state) on until then.
     ///
     /// # Errors
     ///
@@ -180,11 +190,13 @@ impl<'a> Planning<'a> {
         &self,
         promises: &[Option<Promise>],
         (t, x): (f64, &[f64]),
-        acts: f64,
+        acting: &[(f64, [f64; MAX_INPUTS])],
     ) -> Result<(), Failure> {
-        if acts <= t {
+        let delay: f64 = acting.iter().map(|(dt, _)| dt).sum();
+        if delay <= 0.0 {
             return Ok(());
         }
+        let acts = t + delay;
         let begun = |promise: &Option<Promise>| {
             promise.filter(|promise| promise.from <= acts).map(|promise| Promise { from: t, ..promise })
         };
@@ -192,9 +204,8 @@ impl<'a> Planning<'a> {
         if begun.iter().all(Option::is_none) {
             return Ok(());
         }
-        let acting = self.rows.acting();
-        let acting = &acting[..self.rows.input_dim];
-        self.planned(&begun, (t, acts - t), acting, |planner| planner.holds(t, x, acting))
+        let u = acting.first().map_or(&[][..], |(_, u)| &u[..self.rows.input_dim]);
+        self.planned(&begun, (t, delay), u, |planner| planner.holds(t, x, acting))
     }
 
     /// The direction of that state if the measured state moves along `dx`.
@@ -430,25 +441,20 @@ impl<'a> Planning<'a> {
             Some(_) => &narrowed(self.bounds, &self.now().plan.reserve),
             None => self.bounds,
         };
-        // From the sample on, if its input acts later.
-        let mut arrived = self.now().arrived.clone();
-        if self.rows.delay > 0.0 {
-            for (now, before) in arrived.iter_mut().zip(&self.before().arrived) {
-                *now = [now[0].min(before[0]), now[1].max(before[1])];
-            }
-        }
+        let measured = self.measured.filter(|_| self.rows.delay > 0.0);
+        let acting: Vec<_> = measured.map(|(t, _)| self.rows.acting(t).collect()).unwrap_or_default();
         let uncertain = self.uncertainty.map(|of| {
             let horizon = self.plans.horizon.unwrap_or(DECISIONS.uncertain_horizon);
-            let delay = self.rows.delay;
-            let measured = self.measured.filter(|_| delay > 0.0);
+            let sample = measured.map_or(t, |(t, _)| t);
             Uncertain {
                 of,
                 bounds: self.bounds,
                 horizon,
-                delay,
+                delay: self.rows.delay,
                 measured,
-                acting: self.rows.acting(),
-                arrived: &arrived,
+                acting: &acting,
+                before: self.rows.state.acting_at(&self.rows.bounds, sample),
+                arrived: &self.now().arrived,
                 period: self.plans.period,
                 last: self.before().last_time(),
             }
@@ -470,17 +476,17 @@ impl<'a> Planning<'a> {
         sides.map(|(sign, limit)| Limit { plant, state, sign, limit }).collect()
     }
 
-    /// [`Self::trajectory`] from the model's state `x`.
+    /// [`Self::trajectory`] under `inputs`, each with its end in s, from the model's state `x`.
     pub(super) fn along(
         &self,
-        backup_plan: &BackupPlan,
+        inputs: &[(f64, [f64; MAX_INPUTS])],
         t: f64,
         x: &[f64],
         step: f64,
     ) -> Vec<(f64, Vec<f64>, [f64; MAX_INPUTS])> {
         let (mut at, mut x, mut trajectory) = (t, x.to_vec(), Vec::new());
         let Some(plant) = self.plant() else { return trajectory };
-        for (end, u) in &backup_plan.inputs {
+        for (end, u) in inputs {
             let (begin, steps) = (at, ((end - at) / step) as usize + 1);
             for k in 1..=steps {
                 trajectory.push((at, x.clone(), *u));
@@ -489,7 +495,7 @@ impl<'a> Planning<'a> {
                 at = next;
             }
         }
-        trajectory.extend(backup_plan.inputs.last().map(|(_, u)| (at, x, *u)));
+        trajectory.extend(inputs.last().map(|(_, u)| (at, x, *u)));
         trajectory
     }
 

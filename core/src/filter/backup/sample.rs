@@ -90,7 +90,7 @@ impl Decision<'_> {
         let are_points = self.courses.iter().flatten().all(|course| all_finite(&course.point));
         let is_valid = t.is_finite() && all_finite(x) && are_points;
         if t.is_finite() && (is_valid || self.now().sample.is_some()) {
-            self.next().arrived = self.planning().arriving(t);
+            self.next().arrived = self.planning().arriving(self.measured.0);
             self.see(t, is_valid.then_some(x));
             self.next().note(t, hold);
         }
@@ -171,12 +171,13 @@ impl Decision<'_> {
             let later = least_factor(planning.longest(Plans::LONGEST, yields), None, later, sooner);
             found = later.map_or(found, Ok);
         }
-        if hold < planning.rows.delay * (1.0 - TOLERANCES.on_time) {
+        if planning.is_jittery() && hold < planning.rows.delay * (1.0 - TOLERANCES.on_time) {
             found = Err(Failure::Overtaken);
         }
         // Until its first input acts, a filter can only look on.
+        let acting: Vec<_> = planning.rows.acting(self.measured.0).collect();
         found = found.and_then(|(factor, first)| {
-            planning.waits(&first.promises, self.measured, t).map(|()| (factor, first))
+            planning.waits(&first.promises, self.measured, &acting).map(|()| (factor, first))
         });
         match found {
             Ok((factor, First { promises, plan, is_old })) => {
@@ -337,7 +338,7 @@ impl Decision<'_> {
 
     /// What is missed before the input of the sample acts, where no plan says that nothing is: it was lost, or an exact plant is
     /// not where it led.
-    fn unguarded(&self, At { t, hold, x }: At<'_>) -> Option<Failure> {
+    fn unguarded(&self, At { hold, x, .. }: At<'_>) -> Option<Failure> {
         let status = self.before().status;
         let is_there = self.uncertainty.is_some() || !self.now().deviation.is_displaced(hold, x);
         // The first plan was decided on with that time.
@@ -346,7 +347,8 @@ impl Decision<'_> {
         }
         let mut promises = self.now().promises.clone();
         promises.iter_mut().flatten().for_each(|promise| (promise.margin, promise.reserve) = (0.0, 0.0));
-        self.planning().waits(&promises, self.measured, t).err()
+        let acting: Vec<_> = self.rows.acting(self.measured.0).collect();
+        self.planning().waits(&promises, self.measured, &acting).err()
     }
 
     /// What may be missed before the next sample under `u`, if the plant continues to deviate from the model as observed.
@@ -367,7 +369,10 @@ impl Decision<'_> {
             let falls: f64 = slope.iter().zip(&differs).map(|(slope, differs)| slope.abs() * differs).sum();
             (kept.margin, kept.reserve, kept.firm) = (DECISIONS.gusts * falls, 0.0, t);
         }
-        match self.planning().planned(&promises, (t, hold), u, |planner| planner.holds(t, x, u)) {
+        let mut held = [0.0; MAX_INPUTS];
+        held[..u.len()].copy_from_slice(u);
+        match self.planning().planned(&promises, (t, hold), u, |planner| planner.holds(t, x, &[(hold, held)]))
+        {
             Err(Failure::Broken { barrier, time, slack }) => Some(Failure::Drift { barrier, time, slack }),
             _ => None,
         }

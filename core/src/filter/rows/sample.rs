@@ -106,7 +106,6 @@ impl Rows {
     ///
     /// Derivatives or a row that cannot carry a constraint.
     fn rows(&mut self, moment: &Moment) -> Result<(), Status> {
-        let acting = if self.delay > 0.0 { self.acting() } else { [0.0; MAX_INPUTS] };
         let Workspace { next, report, requirements, search, .. } = &mut self.workspace;
         // Within the capacity: a step does not allocate.
         requirements.clear();
@@ -116,7 +115,7 @@ impl Rows {
         for (i, slot) in self.slots.iter_mut().enumerate() {
             let report = &mut report.barriers[i];
             let plants = &mut search.evaluations.plants;
-            let h = slot.evaluate(moment, &acting[..moment.u_ref.len()], plants);
+            let h = slot.evaluate(moment, (&self.state, &self.bounds), plants);
             let deadline_unreachable = match slot.advance(promises, i, h, moment, &self.bounds, &self.errors)
             {
                 Ok(is_unreachable) => is_unreachable,
@@ -310,7 +309,9 @@ impl Rows {
             let soft = matches!(slot.now.enforcement, Enforcement::Soft { .. });
             let met = status.is_satisfied() && !soft || row.holds(u);
             // With measurement errors, only the predicted rows contain them and are those of the theorem.
-            let is_kept = slot.now.lowest.is_none() && (predicted || self.errors.is_exact());
+            let is_kept = slot.now.lowest.is_none()
+                && (predicted || self.errors.is_exact())
+                && !self.state.is_crowded();
             promise.on_course &= met && is_kept;
             promise.unmet = (!met).then(|| Unmet::after(promise.unmet, moment.t, report.h));
             report.on_course = promise.on_course;
@@ -372,12 +373,8 @@ impl Rows {
         }
     }
 
-    /// The input that acts until that of the present step does.
-    pub(crate) fn acting(&self) -> [f64; MAX_INPUTS] {
-        match self.state.time {
-            Some(_) => self.state.input,
-            // That of a step that was not armed, or otherwise 0.
-            None => core::array::from_fn(|i| self.bounds.clamp(i, self.state.input[i])),
-        }
+    /// The inputs that act from the sample at `t` on until its own does, each with the time in s for which it does.
+    pub(crate) fn acting(&self, t: f64) -> impl Iterator<Item = (f64, [f64; MAX_INPUTS])> + Clone + use<'_> {
+        self.state.acting(&self.bounds, t, self.delay)
     }
 }

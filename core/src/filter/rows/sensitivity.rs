@@ -450,7 +450,7 @@ impl Rows {
     fn begin(
         &self,
         i: usize,
-        x: &[f64],
+        (t, x): (f64, &[f64]),
         dx: &[f64],
         scratch: &mut [Vec<f64>; 3],
     ) -> Result<(), NoDerivative> {
@@ -461,7 +461,9 @@ impl Rows {
         moving.extend_from_slice(dx);
         if self.delay > 0.0 {
             let source = self.slots[i].source.predict_directional().ok_or(NoDerivative::Source(i))?;
-            source.flow_directional(from, moving, &self.acting()[..self.input_dim], self.delay);
+            for (dt, u) in self.acting(t) {
+                source.flow_directional(from, moving, &u[..self.input_dim], dt);
+            }
         }
         Ok(())
     }
@@ -489,7 +491,7 @@ impl Rows {
         }
         // h and its derivatives where the input begins to act.
         let begin = t + self.delay;
-        self.begin(i, x, dx, scratch)?;
+        self.begin(i, (t, x), dx, scratch)?;
         let [from, moving, _] = &*scratch;
         let direction = Direction { x: moving, u: held };
         if self.delay > 0.0 {
@@ -579,7 +581,7 @@ impl Rows {
     ) -> Result<RowDerivative, NoDerivative> {
         let i = requirement.barrier;
         let (slot, begin, held) = (&self.slots[i], t + self.delay, &[0.0; MAX_INPUTS][..u.len()]);
-        self.begin(i, x, dx, scratch)?;
+        self.begin(i, (t, x), dx, scratch)?;
         let [from, moving, _] = &*scratch;
         let (mut now, mut change) = (Derivatives::ZERO, Ahead::ZERO);
         let source = slot.source.directional().ok_or(NoDerivative::Source(i))?;
@@ -647,7 +649,9 @@ impl Rows {
         if self.delay > 0.0
             && let Some(source) = source.predict()
         {
-            source.flow(from, &self.acting()[..u.len()], self.delay);
+            for (dt, acting) in self.acting(t) {
+                source.flow(from, &acting[..u.len()], dt);
+            }
         }
         let unknown = NoDerivative::Source(requirement.barrier);
         let directional = source.predict_directional().ok_or(unknown)?;

@@ -11,7 +11,7 @@ use super::hold::Lowest;
 use super::outlook::Outlook;
 use super::sample::Moment;
 use super::shared::SharedPlants;
-use super::{FixedTimeState, Infeasible, Phase, SAME_PERIOD, SAME_TIME, Status};
+use super::{FilterState, FixedTimeState, Infeasible, Phase, SAME_PERIOD, SAME_TIME, Status};
 use crate::convergence::comparison::Stack;
 use crate::convergence::sampled::PeriodBound;
 use crate::convergence::stay::Means;
@@ -146,7 +146,12 @@ impl BarrierSlot {
     /// Evaluates h and its derivatives along the plant where the input begins to act (docs/theory.md, sections 1 and 8).
     /// Returns h at the sample itself.
     #[inline]
-    pub(crate) fn evaluate(&mut self, moment: &Moment, acting: &[f64], plants: &mut SharedPlants) -> f64 {
+    pub(crate) fn evaluate(
+        &mut self,
+        moment: &Moment,
+        (state, bounds): (&FilterState, &Bounds),
+        plants: &mut SharedPlants,
+    ) -> f64 {
         let Self { source, plant, now, .. } = self;
         let mut h = None;
         now.from.copy_from_slice(moment.x);
@@ -154,7 +159,9 @@ impl BarrierSlot {
             source.evaluate(moment.t, moment.x, &mut now.derivatives);
             h = Some(now.derivatives.drift[0]);
             if let Some(source) = source.predict() {
-                source.flow(&mut now.from, acting, moment.delay);
+                for (dt, u) in state.acting(bounds, moment.t, moment.delay) {
+                    source.flow(&mut now.from, &u[..moment.u_ref.len()], dt);
+                }
             }
         }
         plants.evaluate((&**source, *plant), moment.begin, &now.from, &mut now.derivatives);

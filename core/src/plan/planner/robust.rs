@@ -24,11 +24,13 @@ pub(crate) struct Uncertain<'a> {
     pub(crate) bounds: &'a Bounds,
     pub(crate) horizon: f64,
     /// How long in s after its sample an input begins to act; if not at once, the sample from which a plan is sought, its
-    /// state, and the input that acts until then.
+    /// state, and the inputs that act until then, each with the time for which it does.
     pub(crate) delay: f64,
     pub(crate) measured: Option<(f64, &'a [f64])>,
-    pub(crate) acting: [f64; MAX_INPUTS],
-    /// What may arrive of each input then, if inputs are followed late; otherwise, or if empty, that input.
+    pub(crate) acting: &'a [(f64, [f64; MAX_INPUTS])],
+    /// The input that acts at the sample, before its own.
+    pub(crate) before: [f64; MAX_INPUTS],
+    /// What may arrive of each input there, if inputs are followed late; otherwise, or if empty, that input.
     pub(crate) arrived: &'a [[f64; 2]],
     /// The time in s after which samples are expected, and when the last input began to act.
     pub(crate) period: f64,
@@ -191,10 +193,11 @@ impl<'a> Planner<'a> {
             .map_err(|lacks| lacks.failure.unwrap_or(Failure::Spreads))
     }
 
-    /// The same planner for a sample at `t` and `x` whose input acts `delay` s later.
+    /// The same planner for a sample at `t` and `x` whose input acts once all of `acting` has, each for its time in s.
     #[must_use]
-    pub(crate) fn delayed(self, delay: f64, t: f64, x: &'a [f64]) -> Self {
-        let uncertain = self.uncertain.map(|of| Uncertain { delay, measured: Some((t, x)), ..of });
+    pub(crate) fn delayed(self, acting: &'a [(f64, [f64; MAX_INPUTS])], t: f64, x: &'a [f64]) -> Self {
+        let delay = acting.iter().map(|(dt, _)| dt).sum();
+        let uncertain = self.uncertain.map(|of| Uncertain { delay, measured: Some((t, x)), acting, ..of });
         Self { uncertain, ..self }
     }
 
@@ -435,16 +438,20 @@ impl<'a> Planner<'a> {
         &'b self,
         uncertain: Uncertain<'b>,
     ) -> Result<(Tube<'b>, Option<Vec<f64>>), Failure> {
-        let Uncertain { of, bounds, delay, measured, acting, arrived, period, .. } = uncertain;
-        let arrives = |i: usize| arrived.get(i).copied().unwrap_or([acting[i]; 2]);
+        let Uncertain { of, bounds, delay, measured, acting, before, arrived, period, .. } = uncertain;
+        let arrives = |i: usize| arrived.get(i).copied().unwrap_or([before[i]; 2]);
         let arrives: Vec<[f64; 2]> = (0..self.dims[1]).map(arrives).collect();
         let tube = Tube::around(self.plant, (of, [delay, period]), bounds, self.dims, self.requirements)
             .ok_or(Failure::Spreads)?
             .acted_on(&arrives);
         let Some((t, x)) = measured else { return Ok((tube, None)) };
-        let grid = Grid { period: delay, even: true };
+        let grid = Grid { period: delay, even: false };
         let mut walk = Walk::new(self.model(delay), self.tolerances, &[], 1.0, grid, (t, x))?.within(tube)?;
-        walk.hold_in_tube(&acting[..self.dims[1]], None, t + delay)?;
+        let mut end = t;
+        for (dt, u) in acting {
+            end += dt;
+            walk.hold_in_tube(&u[..self.dims[1]], None, end)?;
+        }
         let begin = walk.state().to_vec();
         walk.finish().1.map(|tube| (*tube, Some(begin))).ok_or(Failure::Spreads)
     }

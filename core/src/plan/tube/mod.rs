@@ -47,6 +47,7 @@ mod zonotope;
 #[cfg(test)]
 mod tests;
 
+use alloc::collections::VecDeque;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -70,6 +71,8 @@ const GENERATORS: usize = 100;
 const LATE_GENERATORS: usize = 200;
 /// Number of guesses of the deviations on a piece. The second is enough where a piece is short against the plant's motion.
 const GUESSES: u32 = 8;
+/// Number of bounds of the error of a prediction on a piece, each from the one before.
+const REFINED: u32 = 3;
 /// Part by which a guess exceeds what followed from the one before.
 const WIDER: f64 = 0.02;
 /// The factor by which the first guess of what is asked late exceeds what follows from the beginning.
@@ -157,6 +160,8 @@ pub(super) struct Tube<'a> {
     held: f64,
     unseen: Vec<f64>,
     next_unseen: Vec<f64>,
+    /// The pieces over which a state is predicted until the end of the last piece.
+    predicted: VecDeque<Predicted>,
     /// Number of states, and of inputs.
     dims: [usize; 2],
     /// Deviations of the states; if inputs are late, of what arrives from what is asked; and of the inputs asked while
@@ -250,6 +255,7 @@ impl<'a> Tube<'a> {
             held: 0.0,
             unseen: of.errors.clone(),
             next_unseen: of.errors.clone(),
+            predicted: VecDeque::new(),
             dims,
             set: Zonotope::point(n + late + m),
             before: Zonotope::point(n + late + m),
@@ -322,6 +328,14 @@ impl<'a> Tube<'a> {
     /// An input that leaves its bounds.
     pub(super) fn hold(&mut self, v: &[f64], z: &[f64], gain: Option<&[f64]>) -> Result<(), Failure> {
         let ([n, m], kept) = (self.dims, self.dims[0] + self.late);
+        if self.latest > 0.0 && self.delay > 0.0 {
+            // An answer may be to a state that is predicted for a time of this hold.
+            let is_more = |(now, before): (&f64, &f64)| now > before;
+            if !self.gain.is_empty() && self.next_unseen.iter().zip(&self.unseen).any(is_more) {
+                self.lack(Failure::Spreads)?;
+            }
+            self.next_unseen.iter_mut().for_each(|unseen| *unseen *= AHEAD);
+        }
         self.unseen.copy_from_slice(&self.next_unseen);
         self.next_unseen = self.errors();
         self.set.reach(&mut self.reach);
@@ -712,8 +726,8 @@ impl<'a> Tube<'a> {
         self.is_bounded(u, &others)
     }
 
-    /// Bounds how far the state predicted over the delay may be from the true one, on `piece`, on which deviations are up to
-    /// `most`: ε′ ≥ ε + d (|M| ε′ + w + |N| (γ − 1) u) wherever the two are.
+    /// Bounds how far the state predicted over the delay until the end of `piece`, on which deviations are up to `most`, may be
+    /// from the true one, piece by piece from the error of its measurement on.
     fn predict(
         &mut self,
         model: &dyn Predict,
@@ -722,7 +736,33 @@ impl<'a> Tube<'a> {
         residual: impl Fn(usize) -> f64,
     ) {
         let ([n, m], kept) = (self.dims, self.dims[0] + self.late);
-        let Self { of, delay, next_unseen, plant, rooms, lates, noise, reach, differs, .. } = self;
+        let mut begin = self.errors();
+        let Self {
+            of,
+            delay,
+            latest,
+            next_unseen,
+            predicted,
+            plant,
+            rooms,
+            lates,
+            noise,
+            reach,
+            differs,
+            ..
+        } = self;
+        // From the measurement until this piece.
+        let dt = piece.dt.min(*delay);
+        // A late sample may be predicted for any time of it.
+        let (mut first, mut left) = (predicted.len(), if *latest > 0.0 { *delay } else { *delay - dt });
+        while first > 0 && left > 0.0 {
+            first -= 1;
+            left -= predicted[first].dt;
+        }
+        predicted.drain(..first);
+        for (k, before) in predicted.iter().enumerate() {
+            begin = before.after(&begin, if k == 0 { before.dt + left.min(0.0) } else { before.dt });
+        }
         let Rooms { variables, rates, at: here, slopes, .. } = rooms;
         let evaluate = |variables: &[Second], out: &mut [Second]| {
             let (x, u) = variables.split_at(n);
@@ -738,16 +778,19 @@ impl<'a> Tube<'a> {
                 + (1.0 - least).abs().max((largest - 1.0).abs())
                     * (piece.u[j].abs() + reach[kept + j] + apart + late)
         };
-        // What earlier pieces of the hold left goes on, and the prediction itself is resolved as a reference is.
-        let begin: Vec<f64> =
-            next_unseen.iter().enumerate().map(|(i, unseen)| unseen + residual(i)).collect();
-        let mut guess: Vec<f64> =
-            (0..n).map(|i| 2.0 * begin[i] + 2.0 * *delay * of.rates[i] + LEAST).collect();
+        // The prediction itself is resolved as a reference is.
+        let mut own = Predicted {
+            dt: piece.dt,
+            slopes: vec![0.0; n * n],
+            fixed: vec![0.0; n],
+            residual: (0..n).map(residual).collect(),
+            most: (0..n).map(|i| 2.0 * begin[i] + 2.0 * dt * of.rates[i] + LEAST).collect(),
+        };
         for _ in 0..GUESSES {
             here.clear();
             here.extend((0..n + m).map(|i| match i < n {
                 true => {
-                    let wide = most[i] + guess[i];
+                    let wide = most[i] + own.most[i];
                     Interval::new(piece.over[i][0].low - wide, piece.over[i][0].high + wide)
                 }
                 false => Interval::new(
@@ -756,23 +799,52 @@ impl<'a> Tube<'a> {
                 ),
             }));
             plant.slopes(here, (variables, rates), evaluate, slopes);
-            let wanted: Vec<f64> = (0..n)
-                .map(|i| {
-                    let slope = |j: usize| size(slopes[i * (n + m) + j]);
-                    let moved: f64 = (0..n).map(|j| slope(j) * guess[j]).sum();
-                    let driven: f64 = (0..m).map(|j| slope(n + j) * lost(j)).sum();
-                    (begin[i] + *delay * (moved + driven + of.rates[i])) * (1.0 + ROUND_OFF)
-                })
-                .collect();
-            if wanted.iter().zip(&guess).all(|(wanted, guess)| wanted <= guess) {
-                for (unseen, wanted) in next_unseen.iter_mut().zip(wanted) {
-                    *unseen = unseen.max(wanted);
+            for i in 0..n {
+                let slope = |j: usize| size(slopes[i * (n + m) + j]);
+                (0..n).for_each(|j| own.slopes[i * n + j] = slope(j));
+                own.fixed[i] = of.rates[i] + (0..m).map(|j| slope(n + j) * lost(j)).sum::<f64>();
+            }
+            let wanted = own.bound(&begin, &own.most, dt);
+            if wanted.iter().zip(&own.most).all(|(wanted, most)| wanted <= most) {
+                for (unseen, end) in next_unseen.iter_mut().zip(own.after(&begin, dt)) {
+                    *unseen = if *latest > 0.0 { unseen.max(end) } else { end };
                 }
+                predicted.push_back(own);
                 return;
             }
-            guess = wanted.iter().map(|wanted| 1.2 * wanted + LEAST).collect();
+            own.most = wanted.iter().map(|wanted| AHEAD * wanted + LEAST).collect();
         }
         next_unseen.fill(f64::INFINITY);
+    }
+}
+
+/// A piece over which a state is predicted. Its error, which begins with ε, obeys ε′ ≥ ε + dt (|M| ε′ + w + |N| (γ − 1) u)
+/// wherever the predicted and the true state are.
+struct Predicted {
+    dt: f64,
+    /// |M|, by rows, and what does not depend on the error; what the prediction itself leaves out.
+    slopes: Vec<f64>,
+    fixed: Vec<f64>,
+    residual: Vec<f64>,
+    /// The largest error for which these hold: that of a prediction from the earliest measurement.
+    most: Vec<f64>,
+}
+
+impl Predicted {
+    /// The error after the last `dt` s of the piece, if it is `begin` before and `most` at most.
+    fn bound(&self, begin: &[f64], most: &[f64], dt: f64) -> Vec<f64> {
+        let rows = self.slopes.chunks_exact(most.len());
+        let after = rows.zip(&self.fixed).zip(begin.iter().zip(&self.residual));
+        after
+            .map(|((row, fixed), (begin, residual))| {
+                (begin + residual + dt * (zonotope::dot(row, most) + fixed)) * (1.0 + ROUND_OFF)
+            })
+            .collect()
+    }
+
+    /// The same, if it is `begin` before: at most that of an earlier measurement.
+    fn after(&self, begin: &[f64], dt: f64) -> Vec<f64> {
+        (0..REFINED).fold(self.most.clone(), |most, _| self.bound(begin, &most, dt))
     }
 }
 
