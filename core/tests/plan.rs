@@ -640,7 +640,7 @@ fn a_faster_clock_becomes_the_usual_one() {
 #[test]
 fn the_flag_falls_before_a_drift_leaves_a_set() {
     let mut fallen = 0;
-    for seed in 1..=24_u64 {
+    for seed in 1..=draws(12, 24) {
         let random = &mut seeded(seed);
         let (speed, angle) = (random.between(0.2, 0.6), random.between(0.0, std::f64::consts::TAU));
         for wind in [[0.0; 2], [speed * angle.cos(), speed * angle.sin()]] {
@@ -1460,7 +1460,8 @@ fn plans_stand_behind_an_integral_too() {
         [x[3] * (cos - sin * u[1]), x[3] * (sin + cos * u[1]), x[3] * u[1] / LENGTH, u[0]]
     };
     let (mut accepted, mut compared, deadline, period) = (0, [0; 2], 5.0, 0.05);
-    for seed in 1..=8_u64 {
+    let seeds = draws(4, 8);
+    for seed in 1..=seeds {
         let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));
         let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0).expect("valid disc");
         let model = SmallSlipBicycle::new(LENGTH).expect("a length").with_rate();
@@ -1515,7 +1516,7 @@ fn plans_stand_behind_an_integral_too() {
             if k == 0 && !assurance.is_assured() {
                 break;
             }
-            accepted += usize::from(k == 0);
+            accepted += u64::from(k == 0);
             assert!(assurance.is_assured(), "{seed} at {t}: {assurance:?}");
             // The angle is the mean over the period, of an integral with its limits and its rate.
             assert!((LIMITS[0]..=LIMITS[1]).contains(&filter.integrated()), "{}", filter.integrated());
@@ -1536,7 +1537,7 @@ fn plans_stand_behind_an_integral_too() {
         }
     }
     assert!(compared.iter().all(|n| *n >= 5), "{compared:?}");
-    assert!(accepted >= 7, "{accepted} of 8 accepted");
+    assert!(accepted + 1 >= seeds, "{accepted} of {seeds} accepted");
 }
 
 /// Every state of a plant without drift is a rest: there is nothing to brake.
@@ -1640,7 +1641,8 @@ fn armed_again_it_goes_on_with_the_plan_at_hand() {
     let helps = Arc::new(AtomicBool::new(true));
     let made = || {
         let helps = Arc::clone(&helps);
-        behind_a_wall(Plans::every(PERIOD).policy(move |_, x, u| match helps.load(Ordering::Relaxed) {
+        let plans = Plans::every(PERIOD).search_budget(1);
+        behind_a_wall(plans.policy(move |_, x, u| match helps.load(Ordering::Relaxed) {
             true => through_the_gap(x, u),
             false => u.fill(0.0),
         }))
@@ -2199,7 +2201,7 @@ impl Way {
 #[test]
 fn a_thin_wall_is_seen_wherever_it_stands() {
     let random = &mut Random(11);
-    for _ in 0..draws(3, 100) {
+    for _ in 0..draws(2, 100) {
         let wall = [random.between(10.0, 280.0), 0.0, random.between(0.1, 2.0)];
         let way = Way { things: vec![wall], kind: Thing::Wall };
         let x = [0.0, 0.0, random.between(0.0, 8.0), 0.0];
@@ -2216,7 +2218,7 @@ fn a_thin_wall_is_seen_wherever_it_stands() {
 /// A plan that is given drives around each of them, and the guarantee is not lost: the plant is the model.
 #[test]
 fn small_things_on_a_long_way_are_seen() {
-    let seeds = draws(12, 400);
+    let seeds = draws(6, 400);
     let mut assured = 0;
     for seed in 1..=seeds {
         let random = &mut Random(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(seed));

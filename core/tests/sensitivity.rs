@@ -116,7 +116,7 @@ fn formed(builder: FilterBuilder, form: Form) -> Filter {
         Form::Pointwise => builder.sampling(Sampling::Pointwise),
         Form::Measured => builder.sampling(Sampling::Measured { first: None }),
         Form::Period => builder.sampling(Sampling::Period(0.05)),
-        Form::Delayed => builder.sampling(Sampling::Period(0.05)).and_then(|b| b.actuation_delay(0.03)),
+        Form::Delayed => builder.sampling(Sampling::Period(0.05)).and_then(|b| b.actuation_delay(0.13)),
     }
     .and_then(FilterBuilder::build)
     .expect("valid filter")

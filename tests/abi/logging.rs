@@ -87,14 +87,14 @@ fn an_ordinary_run_is_silent_unless_asked() {
 /// Whatever disables plans gives a warning at instantiation, which still succeeds.
 #[test]
 fn what_switches_plans_off_is_logged_once() {
-    let declared = FILTER.replace("assurance = \"off\"", "actuation_delay = 0.002");
+    let declared = FILTER.replace("assurance = \"off\"", "actuation_delay = 0.3");
     let fmu = Fmu::new(&declared.replace("deadline", "disturbance = 0.5\ndeadline"));
     let slave = Slave::new(&fmu);
     let entries = slave.log.entries();
     let [entry] = &entries[..] else { panic!("{entries:?}") };
     assert_eq!((entry.status, entry.category.as_str()), (1, "logStatusWarning"), "{entry:?}");
     for part in
-        ["the guarantee of goal", "actuation_delay is 0.002", "goal.disturbance is 0.5", "assurance = \"on\""]
+        ["the guarantee of goal", "actuation_delay is 0.3", "goal.disturbance is 0.5", "assurance = \"on\""]
     {
         assert!(entry.message.contains(part) && !entry.message.contains('%'), "{part}: {entry:?}");
     }

@@ -55,7 +55,7 @@ fn the_layout_is_what_is_documented() {
         let fmu = Fmu::new(configuration);
         let bytes = stepped(&fmu).now();
         assert_eq!(&bytes[..VERSION], b"PUNCTUAL");
-        assert_eq!(bytes[VERSION..GUID], 12_u32.to_le_bytes());
+        assert_eq!(bytes[VERSION..GUID], 13_u32.to_le_bytes());
         assert_eq!(&bytes[GUID..LENGTH], fmu.guid().as_bytes());
         assert_eq!(bytes[LENGTH..MODE], (bytes.len() as u64).to_le_bytes());
         assert_eq!(bytes[MODE], 2, "step mode");
@@ -102,7 +102,7 @@ fn the_message_says_what_is_wrong() {
     for (bytes, wanted) in [
         (Vec::new(), "the state is cut off in the magic number: 0 bytes of 8".to_owned()),
         (with(&bytes, 0, b"p"), "the bytes do not begin as a state does, with \"PUNCTUAL\"".to_owned()),
-        (forged(VERSION, &[1]), "the version of the layout is 1, must be 12".to_owned()),
+        (forged(VERSION, &[1]), "the version of the layout is 1, must be 13".to_owned()),
         (
             other.now(),
             format!(

@@ -103,10 +103,6 @@ fn what_no_plan_accounts_for_is_an_error() {
         workshop.punctual(["check", "filter.toml"]).fails(2, &message);
     };
     told(
-        filter("on", 8.0, "actuation_delay = 0.1"),
-        "actuation_delay is 0.1, must be <= period = 0.05 for a plan",
-    );
-    told(
         declared("on", "", "disturbance = 0.2"),
         "tree.disturbance is 0.2, must be 0 for a plan; plans account for `rates` of [uncertainty] in its place",
     );
@@ -135,12 +131,14 @@ fn plans_are_followed_where_that_is_possible() {
     assert_eq!(line(&filter("off", 8.0, "")), "plans: none, since assurance is \"off\"");
     let unbounded = left("").replace(", omega = [-2.0, 2.0]", "");
     assert_eq!(line(&unbounded), "plans: none, since omega has no bounds");
-    assert_eq!(line(&left("actuation_delay = 0.01")), followed);
-    let delayed = left("actuation_delay = 0.1");
-    assert_eq!(
-        line(&delayed),
-        "plans: none, since actuation_delay is 0.1, must be <= period = 0.05 for a plan"
-    );
+    for delay in ["0.01", "0.1", "0.13"] {
+        assert_eq!(line(&left(&format!("actuation_delay = {delay}"))), followed);
+    }
+    let late = left("actuation_delay = 0.1\nuncertainty.jitter = 0.1");
+    workshop.write("filter.toml", late);
+    let message = "filter.toml: uncertainty: only plans account for it, and none are followed: actuation_delay is 0.1, must be <= \
+                   period = 0.05 for a plan, where samples come late";
+    workshop.punctual(["check", "filter.toml"]).fails(2, message);
     let moving = left("").replace("name = \"tree\"", "name = \"tree\"\ncentre_input = true");
     assert!(
         line(&moving).starts_with(
@@ -259,18 +257,12 @@ fn starts_that_can_be_promised_are_drawn() {
 }
 
 /// The content of a file, and the keys that the warning must name because plans do not support them.
-const DECLARED: [(&str, &str, &[&str]); 8] = [
-    ("actuation_delay = 0.1", "", &["actuation_delay is 0.1, "]),
+const DECLARED: [(&str, &str, &[&str]); 6] = [
     ("", "disturbance = 0.2", &["tree.disturbance is 0.2, "]),
     ("", "begin = 1.0\ndeadline = 9.0", &["tree.begin is 1, "]),
     ("", "after = \"goal\"", &["tree.after is \"goal\", "]),
     ("", "centre_input = true", &["tree follows a centre that is moved from outside, "]),
     ("", "velocity = [1.0, 0.0]", &["goal moves with time, ", "(`plan_horizon`)"]),
-    (
-        "actuation_delay = 0.1",
-        "disturbance = 0.3",
-        &["actuation_delay is 0.1, ", "tree.disturbance is 0.3, "],
-    ),
     (
         "measurement_errors = { v = 0.1 }",
         "disturbance = 0.1\nbegin = 2.0\ndeadline = 9.0",

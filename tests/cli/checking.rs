@@ -621,7 +621,7 @@ fn what_a_plan_bears_is_said_and_can_be_declared() {
     workshop.write("car.toml", file(""));
     let text = workshop.punctual(["check", "car.toml"]).success();
     assert!(text.contains("it bears at least, each alone and declared: rates x_p "), "{text}");
-    assert!(text.contains("delay 20 ms, a step"), "{text}");
+    assert!(text.contains(" steps"), "{text}");
     let report: Value =
         serde_json::from_str(&workshop.punctual(["check", "car.toml", "--json"]).success()).expect("JSON");
     let sizes = |kind: &str| -> Vec<f64> {
@@ -631,11 +631,15 @@ fn what_a_plan_bears_is_said_and_can_be_declared() {
     for kind in ["rates", "measurement_errors", "gains", "lags"] {
         assert!(sizes(kind).iter().all(|size| *size > 0.0), "{kind}: {report:#}");
     }
+    // In whole steps, and more than one.
+    let delay = report["robustness"]["delay"].as_f64().expect("a number");
+    assert!(delay >= 2.0 * 0.02 && (delay / 0.02).fract() < 1e-9, "{report:#}");
     let [rate, gain, lag] = [sizes("rates")[3], sizes("gains")[0], sizes("lags")[1]].map(|size| 0.5 * size);
     for declared in [
         format!("uncertainty.rates.v = {rate}"),
         format!("uncertainty.inputs.a.gain = [{}, {}]", 1.0 - gain, 1.0 + gain),
         format!("uncertainty.inputs.omega.lag = [0.0, {lag}]"),
+        format!("actuation_delay = {delay}"),
     ] {
         workshop.write("declared.toml", file(&declared));
         let text = workshop.punctual(["check", "declared.toml"]).success();

@@ -140,9 +140,9 @@ defects! {
         "uncertainty: only plans account for it, and none are followed: assurance is \"off\". Change that, or leave `[uncertainty]` out";
     uncertainty_without_bounds: UNCERTAIN, ", omega = [-2.0, 2.0]" => "",
         "uncertainty: only plans account for it, and none are followed: omega has no bounds. Change that, or leave `[uncertainty]` out";
-    uncertainty_beside_a_delay: UNCERTAIN, "uncertainty =" => "actuation_delay = 0.002\nuncertainty =",
-        "uncertainty: only plans account for it, and none are followed: actuation_delay is 0.002, must be <= period = 0.001 for a \
-         plan. Change that, or leave `[uncertainty]` out";
+    uncertainty_beside_a_delay: UNCERTAIN, "uncertainty =" => "actuation_delay = 0.3\nuncertainty =",
+        "uncertainty: only plans account for it, and none are followed: actuation_delay is 0.3, must be <= 250 times period = 0.001 \
+         for a plan. Change that, or leave `[uncertainty]` out";
     an_acceleration_of_a_centre_that_is_no_input: UNCERTAIN, "radius = 2.0" => "radius = 2.0\nacceleration = 0.3",
         "barrier[0].acceleration: is for a centre that is measured: it needs `centre_input = true`";
     an_error_of_a_centre_without_its_acceleration: UNCERTAIN,
