@@ -45,6 +45,7 @@
 //! | `affine` | whether inputs enter linearly |
 //! | `units` | whether the units can be right |
 //! | `tape` | trees to one tape: constants folded, equal operations merged |
+//! | `scale` | how large an expression is |
 //! | `series` | Taylor coefficients of a tape |
 //! | `motion` | the motion of a plant, and the series of a barrier along it |
 //! | `evaluated` | plants and barriers computed by foreign code |
@@ -61,6 +62,7 @@ mod functions;
 mod model;
 mod motion;
 mod names;
+mod scale;
 mod series;
 mod syntax;
 mod tape;

@@ -14,7 +14,7 @@ use crate::motion::{self, Equations, Identity};
 use crate::series::Series;
 use crate::syntax::{self, TIME, Tree};
 use crate::tape::{Record, Register, Step, Tape, Value, needed, unknown};
-use crate::{Error, MAX_STATES, affine};
+use crate::{Error, MAX_STATES, affine, scale};
 
 /// A plant `ẋ = f(x) + g(x) u` with one expression for each component.
 ///
@@ -164,6 +164,20 @@ impl Model {
         let tree = syntax::parse(expression);
         let h = tree.and_then(|tree| model.compile(&tree, false, true));
         Ok(Barrier { h: h.map_err(|e| Error::new("expression", e))?, model })
+    }
+
+    /// The scale of an expression of states within `ranges`, parameters and the time, in its unit: finite and ≥ 0. It is the
+    /// magnitude of the constant term, as 5 of `5 - z`, or the largest value where that is less; 0 where there is no such term,
+    /// or the largest value is not seen from the text. At every time some state has any value below the scale.
+    ///
+    /// # Errors
+    ///
+    /// A syntax error.
+    pub fn scale(&self, expression: &str, ranges: &[[f64; 2]]) -> Result<f64, Error> {
+        let tree = syntax::parse(expression).map_err(|e| Error::new("expression", e))?;
+        let parameter = |name: &str| self.parameters.iter().find(|p| p.0 == name).map(|p| p.1);
+        let state = |name: &str| ranges.get(self.states.iter().position(|n| n == name)?).copied();
+        Ok(scale::of(&tree, &parameter, &state))
     }
 }
 

@@ -348,7 +348,7 @@ fn number(function: Function, a: f64, b: f64) -> f64 {
     }
 }
 
-fn function(name: &str) -> Result<(Function, usize), String> {
+pub(crate) fn function(name: &str) -> Result<(Function, usize), String> {
     let found = FUNCTIONS.iter().find(|f| f.0 == name);
     found.map(|f| (f.1, f.2)).ok_or_else(|| {
         let names = FUNCTIONS.map(|f| f.0);

@@ -181,6 +181,26 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, cases: 2000, ..ProptestConfig::default() })]
+
+    /// On a grid, whose states are not quite the best.
+    #[test]
+    fn random_barriers_reach_a_ten_thousandth_of_their_scale_at_every_time(barrier in tree(true)) {
+        const RANGE: [f64; 2] = [-2.0, 2.0];
+        let model = Model::new(&["x", "y"], &["u"], &[], &["u", "0"]).expect("a model");
+        let scale = model.scale(&barrier.text(), &[RANGE; 2]).expect("an expression");
+        prop_assert!(scale.is_finite() && scale >= 0.0, "{scale}");
+        for t in [0.0, 0.3, 20.0] {
+            let grid = (0..=40).flat_map(|i| (0..=40).map(move |j| [i, j].map(|k| 0.1 * f64::from(k) - 2.0)));
+            let values = grid.map(|x| barrier.value(t, &x)).filter(|h| !h.is_nan());
+            // An expression that is nowhere a number is refused elsewhere.
+            let Some(largest) = values.reduce(f64::max) else { continue };
+            prop_assert!(scale == 0.0 || largest >= 1e-4 * scale, "{largest} {scale}: {}", barrier.text());
+        }
+    }
+}
+
 const DISC: &str = "sqrt(R^2 + R^2) - sqrt((x_p - c_x)^2 + (y_p - c_y)^2 + R^2)";
 
 fn disc() -> DistanceDisc {

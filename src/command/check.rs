@@ -125,6 +125,9 @@ struct BarrierReport {
     #[serde(skip)]
     chosen: bool,
     margin: f64,
+    /// Whether the margin is the default.
+    #[serde(skip)]
+    by_default: bool,
     start: Option<StartReport>,
 }
 
@@ -511,6 +514,7 @@ fn filter(
             stay_rate,
             chosen: given.is_none() && kept.is_some(),
             margin,
+            by_default: section.has_default_margin(&c.plant),
             start,
         });
     }
@@ -765,7 +769,7 @@ fn filter_text(report: &FilterReport) -> String {
             ("deadline", deadline),
             ("rate", rate),
             ("stay rate", stay_rate),
-            ("margin", output::quantity(b.margin, &b.unit)),
+            ("margin", output::quantity(b.margin, &b.unit) + if b.by_default { " (default)" } else { "" }),
         ];
         if let Some(found) = &b.mixed_degree {
             let found = found.strip_prefix("is ").unwrap_or(found);

@@ -490,6 +490,12 @@ impl PlantSection {
             .map_err(|e| ConfigurationError::new(e.field(), e.message()))
     }
 
+    /// The scale of an expression of states, parameters and time ([`Model::scale`]); 0 of one that cannot be used.
+    pub(super) fn scale_of(&self, expression: &str) -> f64 {
+        let model = self.with_derivatives(&vec!["0"; self.states().len()]).ok();
+        model.and_then(|model| model.scale(expression, &self.ranges()).ok()).unwrap_or(0.0)
+    }
+
     /// The expressions for the derivatives of its states, in order; none where no expressions are known.
     pub(super) fn derivatives(&self) -> Vec<&str> {
         match self {

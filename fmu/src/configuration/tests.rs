@@ -789,6 +789,45 @@ fn models_and_shapes_are_named_as_in_the_file() {
     }
 }
 
+/// The margin of the first barrier of a filter for a tank with the level z, the temperature T and the lid `p` = 4, where its
+/// keys are `barrier`.
+fn tank_margin(barrier: &str) -> f64 {
+    let text = format!(
+        "kind = \"filter\"\n[plant]\nstates = [{{ name = \"z\", unit = \"m\", max = 6.0 }}, {{ name = \"T\", unit = \"K\" }}]\n\
+         inputs = [{{ name = \"u\", unit = \"m/s\" }}, {{ name = \"q\", unit = \"K/s\" }}]\n\
+         parameters = [{{ name = \"p\", start = 4.0, unit = \"m\" }}]\nderivatives = {{ z = \"u\", T = \"q\" }}\n\
+         [[barrier]]\nname = \"set\"\n{barrier}\n"
+    );
+    match Configuration::parse(&text) {
+        Ok(Configuration::Filter(c)) => c.barrier[0].margin,
+        other => panic!("{text}: {other:?}"),
+    }
+}
+
+#[test]
+fn the_default_margin_of_an_expression_is_a_ten_thousandth_of_its_scale() {
+    for (expression, unit, wanted) in [
+        ("5 - z", "m", 0.0005),
+        ("p - z", "m", 0.0004),
+        ("z - 0.01", "m", 1e-6),
+        ("0.001 - z^2", "m2", 1e-7),
+        // The largest level is 6 m.
+        ("z - 5.99", "m", 1e-6),
+        // At most a thousandth.
+        ("T - 293.15", "K", 0.001),
+        ("120 - sqrt(z^2 + 0.01)", "m", 0.001),
+        ("z", "m", 0.0),
+        ("z * T", "m.K", 0.0),
+        ("z + 2 * t", "m", 0.0),
+    ] {
+        let found = tank_margin(&format!("expression = \"{expression}\"\nunit = \"{unit}\""));
+        assert!((found - wanted).abs() <= 1e-12 * wanted, "{expression}: {found}");
+    }
+    assert_eq!(tank_margin("expression = \"5 - z\"\nmargin = 0.0"), 0.0, "given");
+    assert_eq!(tank_margin("expression = \"5 - z\"\nmargin = 0.2"), 0.2, "given");
+    assert_eq!(tank_margin("shape = \"at_most\"\nstate = \"z\"\nbound = 5.0"), 0.0, "no expression");
+}
+
 #[test]
 fn defaults_are_those_of_the_documentation() {
     let Configuration::Filter(c) = Configuration::parse(FILTER).unwrap() else { panic!("not a filter") };

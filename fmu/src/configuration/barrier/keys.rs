@@ -128,7 +128,10 @@ static KEYS: [Row; 36] = [
         key: Key {
             name: "margin",
             value: Number(OfH, Range::NON_NEGATIVE),
-            default: Some("a hundredth of the radius, half axis or half side; else 0"),
+            default: Some(
+                "a hundredth of the radius, half axis or half side; [of an expression](#expressions) a ten-thousandth of its \
+                 constant term, or of the largest h if less, and at most 0.001; else 0",
+            ),
             meaning: "less than the largest h: the target is h ≥ margin, and plans keep half of it in reserve for a plant that differs slightly from the model; the expected loss from held inputs is added",
         },
         parameters: &[whole("h to reach and to stay above", |b| Some(&mut b.margin))],

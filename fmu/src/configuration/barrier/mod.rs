@@ -24,6 +24,11 @@ use super::{BarrierInput, ConfigurationError, PlantSection, external};
 
 /// Default margin as a part of the radius, or of the smaller half axis or side.
 const MARGIN_OF_SIZE: f64 = 0.01;
+/// Part of the scale of an expression that is its default margin: one by this.
+const PARTS_OF_SCALE: f64 = 1e4;
+/// Largest default margin of an expression, in the unit of h: a millimetre where that is m. A constant term may tell more of
+/// where the origin is than of the set, as in kelvin.
+const MOST_OF_EXPRESSION: f64 = 1e-3;
 
 words! {
     /// The method by which the deadline is met.
@@ -138,6 +143,16 @@ pub struct BarrierSection {
     pub until_arrival: bool,
 }
 
+/// The margin of a set on `plant` where the file has none. What is out of range is refused under its own name.
+fn default_margin(shape: &Shape, plant: &PlantSection) -> f64 {
+    match shape {
+        Shape::Expression { expression, .. } => {
+            (plant.scale_of(expression) / PARTS_OF_SCALE).min(MOST_OF_EXPRESSION)
+        }
+        _ => MARGIN_OF_SIZE * shape.size().unwrap_or(0.0).max(0.0),
+    }
+}
+
 impl BarrierSection {
     /// Parses and checks `raw`, a barrier of a filter for `plant`; `path` names it in errors.
     pub(super) fn parse(
@@ -147,8 +162,7 @@ impl BarrierSection {
     ) -> Result<Self, ConfigurationError> {
         check_identifier(&format!("{path}.name"), &raw.name)?;
         let shape = Shape::parse(&raw, path, plant)?;
-        // A size out of range is refused under its own name.
-        let margin = MARGIN_OF_SIZE * shape.size().unwrap_or(0.0).max(0.0);
+        let margin = raw.margin.unwrap_or_else(|| default_margin(&shape, plant));
         Ok(Self {
             name: raw.name,
             shape,
@@ -159,7 +173,7 @@ impl BarrierSection {
             rate: Automatic(raw.rate),
             rates: raw.rates,
             stay_rate: Automatic(raw.stay_rate),
-            margin: raw.margin.unwrap_or(margin),
+            margin,
             recovery: Automatic(raw.recovery),
             disturbance: given(raw.disturbance),
             priority: raw.priority,
@@ -169,6 +183,11 @@ impl BarrierSection {
             end: given(raw.end),
             until_arrival: raw.until_arrival,
         })
+    }
+
+    /// Whether the margin is the one that a file without this key has.
+    pub fn has_default_margin(&self, plant: &PlantSection) -> bool {
+        self.margin == default_margin(&self.shape, plant)
     }
 
     /// The unit of h.
