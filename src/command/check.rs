@@ -125,9 +125,9 @@ struct BarrierReport {
     #[serde(skip)]
     chosen: bool,
     margin: f64,
-    /// Whether the margin is the default.
+    /// What the margin is without the cost of held inputs, if that is the default.
     #[serde(skip)]
-    by_default: bool,
+    default_margin: Option<f64>,
     start: Option<StartReport>,
 }
 
@@ -514,7 +514,7 @@ fn filter(
             stay_rate,
             chosen: given.is_none() && kept.is_some(),
             margin,
-            by_default: section.has_default_margin(&c.plant),
+            default_margin: section.has_default_margin(&c.plant).then_some(section.margin),
             start,
         });
     }
@@ -763,13 +763,19 @@ fn filter_text(report: &FilterReport) -> String {
         let (rate, stay_rate) = (anew(rate, b.chosen && b.deadline.is_none()), anew(stay_rate, b.chosen));
         let deadline =
             b.deadline.map_or_else(|| "none: kept at all times".to_owned(), |d| format!("{} s", number(d)));
+        let margin = output::quantity(b.margin, &b.unit);
+        let margin = match b.default_margin.map(|default| output::quantity(default, &b.unit)) {
+            Some(default) if default == margin => format!("{margin} (default)"),
+            Some(default) => format!("{margin} (default {default})"),
+            None => margin,
+        };
         let mut rows = vec![
             ("relative degree", b.relative_degree.to_string()),
             ("method", b.method.to_owned()),
             ("deadline", deadline),
             ("rate", rate),
             ("stay rate", stay_rate),
-            ("margin", output::quantity(b.margin, &b.unit) + if b.by_default { " (default)" } else { "" }),
+            ("margin", margin),
         ];
         if let Some(found) = &b.mixed_degree {
             let found = found.strip_prefix("is ").unwrap_or(found);

@@ -426,6 +426,52 @@ fn two_vehicles_in_one_model_avoid_each_other() {
     assert!(nearest >= 3.0, "{nearest} m");
 }
 
+/// A cart is pushed by a two-thousandth of its bound towards a wall at which it starts, and to which it comes back at full
+/// speed: plans that lead to h = 0 exactly are lost.
+#[test]
+fn the_default_margin_of_an_expression_keeps_a_promise_that_0_loses() {
+    const CART: &str = r#"
+kind = "filter"
+bounds = { F = [-2.0, 2.0] }
+x0 = { p = 4.999 }
+u_ref = { F = "2 * tanh(50 * (t - 3))" }
+experiment = { step_size = 0.02, stop_time = 16.0 }
+[plant]
+states = [{ name = "p", unit = "m" }, { name = "v", unit = "m/s" }]
+inputs = [{ name = "F", unit = "m/s2" }]
+derivatives = { p = "v", v = "F" }
+[simulated]
+states = [{ name = "p", unit = "m" }, { name = "v", unit = "m/s" }]
+inputs = [{ name = "F", unit = "m/s2" }]
+derivatives = { p = "v", v = "F + 0.001" }
+[[barrier]]
+name = "wall"
+expression = "5 - p"
+unit = "m"
+"#;
+    let workshop = Workshop::new();
+    workshop.write("default.toml", CART);
+    workshop.write("zero.toml", format!("{CART}margin = 0.0\n"));
+    workshop.punctual(["run", "default.toml"]).success();
+    let table = Table::parse(&workshop.text("default/default.csv"));
+    assert!(table.column("filter.wall.guaranteed").iter().all(|g| *g == 1.0));
+    // The wall is approached, and half of the margin stays in reserve.
+    let nearest = table.column("filter.wall.h").into_iter().fold(f64::INFINITY, f64::min);
+    assert!((0.00025..0.0005).contains(&nearest), "{nearest} m");
+    assert_eq!(workshop.punctual(["run", "zero.toml"]).code, 1, "not kept");
+    let table = Table::parse(&workshop.text("zero/zero.csv"));
+    assert!(table.column("filter.wall.guaranteed").contains(&0.0));
+    let margin = |file: &str| {
+        let checked = workshop.punctual(["check", file]).success();
+        let line = checked.lines().find(|line| line.contains("margin")).unwrap_or_default().to_owned();
+        line.split_whitespace().skip(1).map(str::to_owned).collect::<Vec<_>>().join(" ")
+    };
+    assert_eq!(
+        (margin("default.toml"), margin("zero.toml")),
+        ("0.0005 m (default)".to_owned(), "0 m".to_owned())
+    );
+}
+
 /// Wind, errors and weak inputs, all declared: the promise is kept, and never withdrawn.
 #[test]
 fn a_vehicle_that_is_not_its_model_keeps_its_promise() {
