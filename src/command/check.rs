@@ -514,7 +514,7 @@ fn filter(
             stay_rate,
             chosen: given.is_none() && kept.is_some(),
             margin,
-            default_margin: section.has_default_margin(&c.plant).then_some(section.margin),
+            default_margin: (!section.margin_given.0).then_some(section.margin),
             start,
         });
     }

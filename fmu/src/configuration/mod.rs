@@ -32,7 +32,7 @@ mod words;
 pub use alone::RunSection;
 pub use angle::in_degrees;
 pub use barrier::{
-    Automatic, BarrierSection, InfeasibleName, MethodName, Point, ProfileName, SHAPES, Shape, ShapeRow,
+    Automatic, BarrierSection, Given, InfeasibleName, MethodName, Point, ProfileName, SHAPES, Shape, ShapeRow,
 };
 pub use controller::{Controller, ControllerConfiguration, ControllerName};
 pub use deviation::{Deviation, DeviationKind};

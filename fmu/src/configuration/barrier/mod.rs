@@ -79,6 +79,16 @@ impl Automatic {
     }
 }
 
+/// Whether a file states a number, which it is no other configuration without: all of these are equal.
+#[derive(Clone, Copy, Debug)]
+pub struct Given(pub bool);
+
+impl PartialEq for Given {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
 /// A number that a file leaves out or sets to 0.
 fn given(value: f64) -> Option<f64> {
     (value != 0.0).then_some(value)
@@ -117,6 +127,9 @@ pub struct BarrierSection {
     pub stay_rate: Automatic,
     /// Margin μ in the unit of h; the expected cost of held inputs is added.
     pub margin: f64,
+    /// Whether that is the file's own.
+    #[serde(skip)]
+    pub margin_given: Given,
     /// Time in s to be inside again after leaving; without it leaving is reported only.
     pub recovery: Automatic,
     /// Bound on the part of h⁽ⁿ⁾ that the model does not know (a disturbance), in the unit of h per sⁿ. The promise
@@ -162,6 +175,7 @@ impl BarrierSection {
     ) -> Result<Self, ConfigurationError> {
         check_identifier(&format!("{path}.name"), &raw.name)?;
         let shape = Shape::parse(&raw, path, plant)?;
+        let margin_given = Given(raw.margin.is_some());
         let margin = raw.margin.unwrap_or_else(|| default_margin(&shape, plant));
         Ok(Self {
             name: raw.name,
@@ -174,6 +188,7 @@ impl BarrierSection {
             rates: raw.rates,
             stay_rate: Automatic(raw.stay_rate),
             margin,
+            margin_given,
             recovery: Automatic(raw.recovery),
             disturbance: given(raw.disturbance),
             priority: raw.priority,
@@ -183,11 +198,6 @@ impl BarrierSection {
             end: given(raw.end),
             until_arrival: raw.until_arrival,
         })
-    }
-
-    /// Whether the margin is the one that a file without this key has.
-    pub fn has_default_margin(&self, plant: &PlantSection) -> bool {
-        self.margin == default_margin(&self.shape, plant)
     }
 
     /// The unit of h.
