@@ -17,7 +17,7 @@ pub(super) struct RobustnessReport {
     gains: Vec<(String, f64)>,
     /// By input: the time constant in s with which it may be followed.
     lags: Vec<(String, f64)>,
-    /// The time in s by which inputs may be late, at most 16 steps; `null` if a delay is declared.
+    /// The time in s by which inputs may be late, at most 128 steps; `null` if a delay is declared.
     delay: Option<f64>,
     /// The same in steps.
     #[serde(skip)]
@@ -65,7 +65,7 @@ impl RobustnessReport {
                 1 => ", a step".to_owned(),
                 steps => format!(", {steps} steps"),
             };
-            format!("; delay {}{steps}", rounded(1e3 * delay, "ms"))
+            format!("; delay {}{steps}", output::quantity(1e3 * delay, "ms"))
         });
         format!(
             "it bears at least, each alone and declared: rates {};\n  measurement errors {};\n  inputs {} too much or less; lags {}{}",

@@ -137,7 +137,7 @@ fn plans_are_followed_where_that_is_possible() {
     let late = left("actuation_delay = 0.1\nuncertainty.jitter = 0.1");
     workshop.write("filter.toml", late);
     let message = "filter.toml: uncertainty: only plans account for it, and none are followed: actuation_delay is 0.1, must be <= \
-                   period = 0.05 for a plan, where samples come late";
+                   period = 0.05 for a plan, where samples come late. Change that, or leave `[uncertainty]` out";
     workshop.punctual(["check", "filter.toml"]).fails(2, message);
     let moving = left("").replace("name = \"tree\"", "name = \"tree\"\ncentre_input = true");
     assert!(

@@ -639,12 +639,15 @@ fn what_a_plan_bears_is_said_and_can_be_declared() {
         format!("uncertainty.rates.v = {rate}"),
         format!("uncertainty.inputs.a.gain = [{}, {}]", 1.0 - gain, 1.0 + gain),
         format!("uncertainty.inputs.omega.lag = [0.0, {lag}]"),
-        format!("actuation_delay = {delay}"),
     ] {
         workshop.write("declared.toml", file(&declared));
         let text = workshop.punctual(["check", "declared.toml"]).success();
         assert!(text.contains("backup plan: found") && !text.contains("it bears"), "{declared}: {text}");
     }
+    // All of the delay, since it is found by doubling.
+    workshop.write("late.toml", file(&format!("actuation_delay = {delay}")));
+    let text = workshop.punctual(["check", "late.toml"]).success();
+    assert!(text.contains("backup plan: found") && text.contains("covers: delay"), "{text}");
 }
 
 /// A refusal of an uncertain plant names what it would be kept without.
