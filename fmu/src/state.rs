@@ -39,7 +39,7 @@ const CHECKSUM: usize = u32::SIZE;
 ///
 /// None in practice, since the memory of a filter is plain data.
 pub fn size(product: &Product, state: &State) -> Result<usize, Failure> {
-    let tail = if has_tail(product) { u64::SIZE + tail(state)?.len() } else { 0 };
+    let tail = if has_tail(product) { u64::SIZE + tail(product, state)?.len() } else { 0 };
     Ok(fixed_size(product) + tail)
 }
 
@@ -48,18 +48,25 @@ fn has_stop(product: &Product) -> bool {
     product.configuration.experiment().fmi == FmiVersion::Three
 }
 
+fn follows_plans(product: &Product) -> bool {
+    matches!(&product.configuration, Configuration::Filter(c) if c.is_assured())
+}
+
 /// Whether states of `product` have a part of variable length.
 fn has_tail(product: &Product) -> bool {
-    matches!(&product.configuration, Configuration::Filter(c) if c.is_assured() || c.may_be_late())
+    follows_plans(product) || matches!(&product.configuration, Configuration::Filter(c) if c.may_be_late())
 }
 
 /// The inputs on their way, and the plan state.
 type Tail = (Vec<Sent>, PlanState);
 
-/// The bytes of these in `state`.
-fn tail(state: &State) -> Result<Vec<u8>, Failure> {
+/// The bytes of these in `state`, a state of `product`; without plans, of the former alone.
+fn tail(product: &Product, state: &State) -> Result<Vec<u8>, Failure> {
     match &state.block {
-        BlockState::Filter { memory, .. } => postcard::to_stdvec(&(&memory.sent, &memory.plan)),
+        BlockState::Filter { memory, .. } if follows_plans(product) => {
+            postcard::to_stdvec(&(&memory.sent, &memory.plan))
+        }
+        BlockState::Filter { memory, .. } => postcard::to_stdvec(&memory.sent),
         _ => postcard::to_stdvec(&Tail::default()),
     }
     .map_err(|e| e.to_string())
@@ -98,7 +105,7 @@ fn fixed_size(product: &Product) -> usize {
 /// Too few bytes; the state of another product. Nothing was written.
 pub fn write(product: &Product, state: &State, bytes: &mut [u8]) -> Result<(), Failure> {
     let State { guid, mode, time, stop, stepped, last_step, fresh, configured, values, block } = state;
-    let tail = has_tail(product).then(|| tail(state)).transpose()?;
+    let tail = has_tail(product).then(|| tail(product, state)).transpose()?;
     let size = fixed_size(product) + tail.as_ref().map_or(0, |tail| u64::SIZE + tail.len());
     if bytes.len() < size {
         return Err(format!("there is room for {} bytes, must be {size}", bytes.len()));
@@ -240,7 +247,7 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
                 ..FilterState::default()
             };
             if has_tail {
-                (memory.sent, memory.plan) = read_tail(&mut input)?;
+                (memory.sent, memory.plan) = read_tail(product, &mut input)?;
             }
             BlockState::Filter { rearm_seen, memory: Box::new(memory) }
         }
@@ -261,12 +268,18 @@ pub fn read(product: &Product, bytes: &[u8]) -> Result<State, Failure> {
 }
 
 /// What comes last. Whether it belongs to this filter is checked when it is restored.
-fn read_tail(input: &mut Reader) -> Result<Tail, Failure> {
+fn read_tail(product: &Product, input: &mut Reader) -> Result<Tail, Failure> {
     let length: u64 = input.field("length of the plan")?;
     if length != input.rest.len() as u64 {
         return Err(format!("the length of the plan is {length} bytes, must be {}", input.rest.len()));
     }
-    match postcard::take_from_bytes(input.rest) {
+    let read = match follows_plans(product) {
+        true => postcard::take_from_bytes(input.rest),
+        false => {
+            postcard::take_from_bytes(input.rest).map(|(sent, rest)| ((sent, PlanState::default()), rest))
+        }
+    };
+    match read {
         Ok((tail, [])) => Ok(tail),
         Ok((_, rest)) => Err(format!("the plan is followed by {} bytes, must be 0", rest.len())),
         Err(error) => Err(format!("the plan cannot be read: {error}")),
