@@ -46,7 +46,7 @@ fn tally_until<P>(
 where
     P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
 {
-    let cases = std::env::var("PUNCTUAL_ROBUST").map_or(3, |cases| cases.parse().unwrap());
+    let cases = std::env::var("PUNCTUAL_ROBUST").map_or(2, |cases| cases.parse().unwrap());
     let is_point = name == "point mass";
     let (mut draws, declared) = (Draws(seed), declare(is_point));
     let mut tally = Tally { least: f64::INFINITY, ..Tally::default() };

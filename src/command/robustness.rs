@@ -17,7 +17,7 @@ pub(super) struct RobustnessReport {
     gains: Vec<(String, f64)>,
     /// By input: the time constant in s with which it may be followed.
     lags: Vec<(String, f64)>,
-    /// The time in s by which inputs may be late, at most 128 steps; `null` if a delay is declared.
+    /// The time in s by which inputs may be late, at most 16 steps; `null` if a delay is declared.
     delay: Option<f64>,
     /// The same in steps.
     #[serde(skip)]

@@ -48,17 +48,18 @@ fn hex(bytes: &[u8]) -> String {
     })
 }
 
-/// Passes every case of the corpus and `usual` generated ones (times `PUNCTUAL_ATTACK`) to `attack`. Prints
+/// Passes every case of the corpus and half of `usual` generated ones (or `usual` times `PUNCTUAL_ATTACK`) to `attack`. Prints
 /// their number, and the sum of the numbers that `attack` returns, as `counted`. A case that fails is printed
 /// as a line for the corpus. A case that ends the process is left in a file beside the tests.
 pub(crate) fn run(name: &str, usual: usize, counted: &str, mut attack: impl FnMut(&[u8]) -> usize) {
-    let factor =
-        std::env::var("PUNCTUAL_ATTACK").map_or(1, |n| n.parse().expect("PUNCTUAL_ATTACK: a number"));
+    let factor: Option<usize> =
+        std::env::var("PUNCTUAL_ATTACK").ok().map(|n| n.parse().expect("PUNCTUAL_ATTACK: a number"));
+    let generate = factor.map_or(usual / 2, |factor| usual * factor);
     let last = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("attack-{name}"));
     let mut last = File::create(last).expect("a file beside the tests");
     let (begin, kept) = (Instant::now(), corpus(name));
-    let (cases, mut sum) = (kept.len() + usual * factor, 0);
-    for case in kept.into_iter().chain((0..usual * factor).map(generated)) {
+    let (cases, mut sum) = (kept.len() + generate, 0);
+    for case in kept.into_iter().chain((0..generate).map(generated)) {
         last.rewind().expect("a file");
         writeln!(last, "{}", hex(&case)).expect("a file");
         let started = Instant::now();

@@ -25,7 +25,7 @@ pub struct Bears {
     pub gains: Vec<f64>,
     /// The time constant in s with which each input may be followed.
     pub lags: Vec<f64>,
-    /// How long in s after its sample an input may act: at most 128 periods, the longest that is tried. `None` if a delay is
+    /// How long in s after its sample an input may act: at most 16 periods, the longest that is tried. `None` if a delay is
     /// declared.
     pub delay: Option<f64>,
 }
@@ -259,10 +259,7 @@ impl Planning<'_> {
                 && self.planned(promises, (t + delay, self.plans.period), &[], bears).is_ok()
         };
         let periods = |k: i32| elementary::powi(2.0, k) * self.plans.period;
-        match (1..=7).map(periods).take_while(keeps).last() {
-            Some(longest) => longest,
-            None => (-3..=0).rev().map(periods).find(keeps).unwrap_or(0.0),
-        }
+        (-3..=4).rev().map(periods).find(keeps).unwrap_or(0.0)
     }
 }
 
