@@ -395,6 +395,6 @@ deadline = 6.0
         assert_ne!(before, after);
         let mut fresh = saved;
         fresh.block = crate::block::BlockState::Plant { x: vec![0.0; 4] };
-        assert!(instance.restore(&fresh).unwrap_err().contains("4 components, must have 8"));
+        assert!(instance.restore(&fresh).unwrap_err().contains("4 components, must have 12"));
     }
 }

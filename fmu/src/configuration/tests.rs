@@ -270,7 +270,7 @@ defects! {
         "actuation_delay: is -0.1, must be finite and >= 0";
     delay_above_the_step: FILTER,
         "kind = \"filter\"" => "kind = \"filter\"\nactuation_delay = 0.5\nsampling = \"step_size\"",
-        "actuation_delay: is 0.5, must be <= sampling_period = 0.001";
+        "actuation_delay: is 0.5, must be <= 250 times sampling_period = 0.001";
     zero_correction_limit: FILTER, "kind = \"filter\"" => "kind = \"filter\"\ncorrection_limit = 0.0",
         "correction_limit: is 0, must be finite and > 0";
     name_with_a_blank: FILTER, "kind = \"filter\"" => "kind = \"filter\"\nname = \"my filter\"",
