@@ -1,7 +1,6 @@
 """A model as compiled code in FMPy's own loop: bitwise the same as with expressions."""
 
 import os
-import shutil
 import subprocess
 import sys
 
@@ -29,7 +28,11 @@ def cars(tmp_path_factory):
             compiler = [os.environ.get("CC", "cc"), "-std=c99", "-O2", "-shared", "-fPIC", f"-I{header}"]
             subprocess.run([*compiler, "-o", str(folder / library("jerk_car")), str(source)], check=True)
         for part in ["filter", "plant"]:
-            shutil.copy(ROOT / "examples" / kind / f"jerk-car-{part}.toml", folder)
+            text = (ROOT / "examples" / kind / f"jerk-car-{part}.toml").read_text()
+            if kind == "models":
+                # A plug-in has no margin by default, since its expressions are not known.
+                text = text.replace('expression = "v_max - v"', 'expression = "v_max - v"\nmargin = 0.0')
+            (folder / f"jerk-car-{part}.toml").write_text(text)
             punctual("build", f"jerk-car-{part}.toml", "-o", f"{part}.fmu", cwd=folder)
     return folders
 

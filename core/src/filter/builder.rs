@@ -389,8 +389,8 @@ impl<P, const NX: usize, const NU: usize> FilterBuilder<P, NX, NU> {
     ///
     /// Until then the inputs of earlier samples act, one after another; before the first, 0 or the nearest admissible input. The
     /// delay may span up to 250 samples: at more of them than a filter [remembers](super::MAX_SENT) nothing is guaranteed. The
-    /// constraint is enforced from the predicted state at t + delay on. In every barrier report all values but [`h`](super::BarrierReport::h) refer to that time. Deadlines count from the
-    /// first sample itself.
+    /// constraint is enforced from the predicted state at t + delay on. In every barrier report all values but
+    /// [`h`](super::BarrierReport::h) refer to that time. Deadlines count from the first sample itself.
     ///
     /// # Errors
     ///

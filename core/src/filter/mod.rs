@@ -395,12 +395,16 @@ impl Filter {
     ///
     /// # Errors
     ///
-    /// A state with another number of barriers; more inputs on their way than [`MAX_SENT`]; a plan of another filter, or one
-    /// that is damaged.
+    /// A state with another number of barriers; more inputs on their way than [`MAX_SENT`], or none behind an actuation delay;
+    /// a plan of another filter, or one that is damaged.
     pub fn restore(&mut self, state: &FilterState) -> Result<(), Error> {
         length("barriers", state.barriers.len(), self.rows.slots.len())?;
         if state.sent.len() > MAX_SENT {
             let message = format!("has {} entries, must have at most {MAX_SENT}", state.sent.len());
+            return Err(Error::new(ErrorKind::Dimension, "sent", message));
+        }
+        if self.rows.delay > 0.0 && state.time.is_some() && state.sent.is_empty() {
+            let message = format!("is empty, must have the inputs of the last {} s", self.rows.delay);
             return Err(Error::new(ErrorKind::Dimension, "sent", message));
         }
         #[cfg(feature = "plan")]
