@@ -1,6 +1,7 @@
 //! The verdict on a barrier's promise, by h itself and not by what the filter says of it.
 //!
-//! A barrier that began inside is to have h ≥ 0 at all times; one that began outside, from its deadline on.
+//! A barrier that began inside is to have h ≥ 0 at all times; one that began outside, or that begins later and has a
+//! deadline, from its deadline on.
 //! [`Judge`] sees h at instants, and judges at the deadline itself where that lies between two of them. It goes
 //! along a straight line where h has relative degree 1 (exact for an integrator and a linear h), else along the
 //! cubic through the last four. Between two instants that are both inside it looks for nothing.
@@ -57,7 +58,7 @@ pub struct Judgement {
     /// Time in s at which it was enforced first.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub began: Option<f64>,
-    /// Whether h ≥ 0 held then.
+    /// Whether it is to be inside from then on: h ≥ 0 held then, and it began with the first instant or has no deadline.
     pub began_inside: bool,
     /// The instant of its deadline in s; `None` where it has none, or nothing was seen.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
@@ -215,7 +216,7 @@ impl Judge {
     fn begin(&mut self, t: f64, h: f64, promise_state: PromiseState) {
         if promise_state != PromiseState::Waiting && self.seen.began.is_none() {
             self.seen.began = Some(t);
-            self.seen.began_inside = self.is_inside(h);
+            self.seen.began_inside = self.is_inside(h) && (self.count == 0 || self.deadline.is_none());
         }
     }
 

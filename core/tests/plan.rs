@@ -1167,7 +1167,17 @@ fn filters_that_plans_do_not_account_for_are_refused() {
     let disturbed = refused(within.disturbance(0.1), |b| b);
     assert_eq!(disturbed, "goal.disturbance: is 0.1, must be 0 for a plan");
     let later = refused(within, |b| b.window(Begin::At(1.0), End::Never).expect("a window"));
-    assert_eq!(later, "goal.begin: is 1, must be 0 for a plan where there is a deadline");
+    assert_eq!(later, "");
+    let after = |settings| {
+        let builder = Filter::builder(PointMass).barrier("first", disc(), within).expect("valid");
+        let builder = builder.barrier("goal", disc(), settings).expect("valid");
+        let builder = builder.window(Begin::AfterArrival(0), End::Never).expect("a window");
+        let plans = builder.build().expect("valid filter").with_plans(PERIOD);
+        plans.err().map(|error| error.to_string()).unwrap_or_default()
+    };
+    assert_eq!(after(BarrierSettings::within(6.0)), "");
+    let when = "goal.begin: is the arrival of another barrier, which needs a deadline for a plan: when it arrives is open";
+    assert_eq!(after(BarrierSettings::keeping()), when);
     assert_eq!(
         refused(BarrierSettings::keeping(), |b| b.window(Begin::At(1.0), End::Never).expect("a window")),
         ""

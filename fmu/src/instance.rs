@@ -469,10 +469,19 @@ impl Instance {
         let parameters = self.product.layout.parameters..self.product.layout.end;
         let bits = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
         let mut pairs = self.values.reals[parameters.clone()].iter().zip(&values.reals[parameters]);
+        let mut own = None;
         if *configured && !(self.configured && pairs.all(bits)) {
+            self.block.save(own.insert(BlockState::Plant { x: Vec::new() }));
             self.block.configure(values).map_err(|e| e.to_string())?;
         }
-        self.block.restore(block)?;
+        if let Err(reason) = self.block.restore(block) {
+            // With other parameters it may not fit them: back to its own.
+            if let Some(own) = own {
+                self.block.configure(&self.values).map_err(|e| e.to_string())?;
+                self.block.restore(&own)?;
+            }
+            return Err(reason);
+        }
         (self.mode, self.time, self.stop, self.last_step) = (*mode, *time, *stop, *last_step);
         (self.stepped, self.fresh, self.configured) = (*stepped, *fresh, *configured);
         self.values.clone_from(values);

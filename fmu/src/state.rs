@@ -27,7 +27,7 @@ const MAGIC: [u8; 8] = *b"PUNCTUAL";
 
 /// Version of the layout, to be increased with every change of it. (The GUID changes with the version of the
 /// library.)
-const VERSION: u32 = 13;
+const VERSION: u32 = 14;
 
 const GUID: usize = 38;
 const HEADER: usize = MAGIC.len() + u32::SIZE + GUID + u64::SIZE;
@@ -497,6 +497,7 @@ structure!(FixedTimeState {
     period: f64,
     fallback: bool,
     arrival: Option<f64>,
+    since: Option<f64>,
     on_course: bool,
     unmet: Option<Unmet>,
     postponed: u32,

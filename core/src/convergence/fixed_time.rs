@@ -374,6 +374,7 @@ impl FixedTime {
             period,
             fallback,
             arrival: None,
+            since: state.since,
             on_course: applies,
             unmet: state.unmet,
         };

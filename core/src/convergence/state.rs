@@ -59,6 +59,10 @@ pub struct FixedTimeState {
     /// Time in s of the first sample with h ≥ 0 since the anchor.
     #[cfg_attr(feature = "serde", serde(with = "crate::real"))]
     pub arrival: Option<f64>,
+    /// Time in s of the first of the samples in a row with h ≥ 0, for a promise that ends
+    /// [after a stay](crate::filter::End::AfterStay).
+    #[cfg_attr(feature = "serde", serde(with = "crate::real", default))]
+    pub since: Option<f64>,
     /// Whether the theorem behind the present phase applies from the last sample on: its conditions held there. Code that
     /// enforces the row clears it if the row is not met, or if the held input breaks the promise in between.
     pub on_course: bool,

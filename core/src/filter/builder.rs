@@ -279,8 +279,8 @@ impl<P, const NX: usize, const NU: usize> FilterBuilder<P, NX, NU> {
     ///
     /// # Errors
     ///
-    /// No barrier yet; a time out of range; an end before the deadline, which would promise nothing; waiting for a barrier
-    /// that was not added before.
+    /// No barrier yet; a time out of range; an end before the deadline, which would promise nothing; beginning with the
+    /// arrival of a barrier that was not added before, or ending with its own.
     pub fn window(mut self, begin: Begin, end: End) -> Result<Self, Error> {
         self.parts.set_window(begin, end)?;
         Ok(self)
@@ -493,10 +493,15 @@ impl Parts {
             }
             Begin::AfterArrival(_) => {}
         }
-        if let End::At(seconds) = end
-            && positive("end", seconds).map_err(named)? <= opens
-        {
-            return range("end", format!("is {seconds}, must be > begin = {opens}"));
+        match end {
+            End::At(seconds) if positive("end", seconds).map_err(named)? <= opens => {
+                return range("end", format!("is {seconds}, must be > begin = {opens}"));
+            }
+            End::AfterStay(seconds) => _ = positive("end", seconds).map_err(named)?,
+            End::AfterArrival(other) if other == index => {
+                return range("end", format!("waits for barrier {other} itself, must be another one"));
+            }
+            _ => {}
         }
         // After the arrival of another barrier, the deadline counts from there.
         let deadline = slot.promise.deadline();
@@ -532,6 +537,13 @@ impl Parts {
         let dimension = |field, message| Err(Error::new(ErrorKind::Dimension, field, message));
         if slots.is_empty() {
             return dimension("barriers", "is empty, must have at least 1".to_owned());
+        }
+        if let Some((slot, other)) = slots.iter().find_map(|slot| match slot.end {
+            End::AfterArrival(other) if other >= slots.len() => Some((slot, other)),
+            _ => None,
+        }) {
+            let message = format!("waits for barrier {other}, must be one of {} from 0", slots.len());
+            return Err(Error::new(ErrorKind::Range, "end", message).within(&slot.name));
         }
         if slots.len() > MAX_ROWS {
             return dimension(

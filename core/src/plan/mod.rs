@@ -41,7 +41,7 @@ pub use backup_plan::{BackupPlan, Tightest};
 pub(crate) use check::{CheckTolerances, TOLERANCES};
 pub use failure::{Failure, Names};
 pub(crate) use integral::{Integral, Limit};
-pub(crate) use model::{highest, slopes};
+pub(crate) use model::{climb, highest, slopes};
 pub use moving::Motion;
 pub(crate) use moving::{Course, Moving};
 pub(crate) use planner::{Planner, SearchProgress, Uncertain, narrowed};

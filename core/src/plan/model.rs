@@ -217,16 +217,22 @@ pub(super) fn largest_eigenvalue(matrix: &DMatrix<f64>) -> f64 {
 }
 
 /// The largest h found by climbing from `x` at `t`, up to `enough`, in so many steps, each with so many halvings.
-pub(crate) fn highest(
+pub(crate) fn highest(model: &dyn Predict, (t, x): (f64, &[f64]), enough: f64, steps: [u32; 2]) -> f64 {
+    climb(model, t, &mut x.to_vec(), enough, steps)
+}
+
+/// The same; `x` is moved to where that is.
+pub(crate) fn climb(
     model: &dyn Predict,
-    (t, x): (f64, &[f64]),
+    t: f64,
+    x: &mut [f64],
     enough: f64,
     [climbs, halvings]: [u32; 2],
 ) -> f64 {
-    let (mut x, mut gradient, mut next) = (x.to_vec(), x.to_vec(), x.to_vec());
-    let mut h = model.value(t, &x);
+    let (mut gradient, mut next) = (x.to_vec(), x.to_vec());
+    let mut h = model.value(t, x);
     for _ in 0..climbs {
-        slopes(model, t, &x, &mut gradient);
+        slopes(model, t, x, &mut gradient);
         let steepness: f64 = gradient.iter().map(|g| g * g).sum();
         let mut length = (enough - h) / steepness;
         let climbs = (0..halvings).any(|_| {
@@ -241,7 +247,7 @@ pub(crate) fn highest(
             break;
         }
         x.copy_from_slice(&next);
-        h = model.value(t, &x);
+        h = model.value(t, x);
     }
     h
 }

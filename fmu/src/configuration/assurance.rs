@@ -263,7 +263,10 @@ impl FilterConfiguration {
                     "{field} {message}; plans account for `rates` of [uncertainty] in its place"
                 ));
             } else if let Some((name, after)) = of("begin").and_then(|b| Some((&b.name, b.after.as_ref()?))) {
-                found.push(format!("{name}.after is {after:?}, and no plan predicts when that is reached"));
+                found.push(format!(
+                    "{name} begins with the arrival of {after}, whose time is open: give {name} a `deadline` too, or a `begin` \
+                     in place of `after`"
+                ));
             } else if let Some(barrier) = of("source") {
                 // No key has this name. What moves wants the key of a horizon.
                 let key = if message.starts_with("moves") { " (`plan_horizon`)" } else { "" };

@@ -5,17 +5,20 @@ use core::cell::Cell;
 
 use super::bears::Bears;
 use super::planning::Planning;
+use super::schedule::Choice;
 use super::settings::{DECISIONS, DecisionSettings};
 use super::state::Promise;
 use crate::MAX_INPUTS;
 use crate::elementary;
-use crate::filter::{AssuranceStatus, Begin};
+use crate::filter::AssuranceStatus;
 use crate::plan::{BackupPlan, Failure, Plan, Planner};
 
 /// The result of a first sample: what is promised, and by which plan.
 pub(super) struct First {
     pub(super) promises: Vec<Option<Promise>>,
     pub(super) plan: Plan,
+    /// The barriers of the alternatives that are not taken.
+    pub(super) let_go: Vec<usize>,
     /// Whether the plan is from before the filter was armed again.
     pub(super) is_old: bool,
 }
@@ -165,9 +168,48 @@ impl Planning<'_> {
         plan
     }
 
+    /// The first plan for `asked`, or for what may be promised in its place.
+    pub(super) fn first(
+        &self,
+        asked: Vec<Option<Promise>>,
+        at: (f64, f64),
+        x: &[f64],
+        u: &[f64],
+        shorter: &[f64],
+    ) -> Result<First, Failure> {
+        let Some(ways) = self.ways(&asked, at.0, x) else {
+            return self.first_of(asked, at, x, u, shorter);
+        };
+        let mut nearest = None;
+        for Choice { latest, let_go, is_possible, orders } in ways {
+            let search = |promises| self.first_of(promises, at, x, u, shorter);
+            if is_possible {
+                match search(latest.clone()) {
+                    Ok(first) => return Ok(First { let_go, ..first }),
+                    Err(failure) => _ = nearest.get_or_insert(failure),
+                }
+            }
+            for mut order in orders {
+                for _ in 0..=DECISIONS.repairs {
+                    let Some(promises) = self.at_times(&latest, &order, at.0) else { break };
+                    let failure = match search(promises) {
+                        Ok(first) => return Ok(First { let_go, ..first }),
+                        Err(failure) => failure,
+                    };
+                    nearest.get_or_insert(failure);
+                    // More time for what is not reached.
+                    let Failure::Broken { barrier, .. } = failure else { break };
+                    let Some(slower) = order.slower_to(barrier, at.0, self.plans.period) else { break };
+                    order = slower;
+                }
+            }
+        }
+        Err(nearest.unwrap_or(Failure::Nothing))
+    }
+
     /// The first plan for `promises`: with their reserve; otherwise without; otherwise for deadlines shortened to one of the
     /// parts `shorter`; otherwise the current plan.
-    pub(super) fn first(
+    fn first_of(
         &self,
         mut promises: Vec<Option<Promise>>,
         at: (f64, f64),
@@ -200,7 +242,10 @@ impl Planning<'_> {
                 .filter_map(|part| search(&self.sooner(&promises, at.0, *part)).ok().filter(reaches));
             found = earlier.next().map_or(found, Ok);
         }
-        let Err(failure) = found else { return found.map(|plan| First { promises, plan, is_old: false }) };
+        let let_go = Vec::new();
+        let Err(failure) = found else {
+            return found.map(|plan| First { promises, plan, let_go, is_old: false });
+        };
         let old = &self.before().plan;
         // A law in a tube was checked for what was promised then.
         let is_bound = self.uncertainty.is_some();
@@ -215,14 +260,14 @@ impl Planning<'_> {
             Ok(backup_plan) if promises.iter().flatten().all(|promise| promise.from < backup_plan.until) => {
                 let mut plan = old.clone();
                 plan.backup_plan = backup_plan;
-                Ok(First { promises, plan, is_old: true })
+                Ok(First { promises, plan, let_go, is_old: true })
             }
             _ => Err(failure),
         }
     }
 
     /// A plan for `promises` near `plan`. The deadlines of `promises` are `factor` times those that `plan` was made for. The
-    /// search looks only near that plan.
+    /// search looks only near that plan, and not at all where there was a choice.
     pub(super) fn beside(
         &self,
         mut promises: Vec<Option<Promise>>,
@@ -232,13 +277,14 @@ impl Planning<'_> {
         plan: &Plan,
         factor: f64,
     ) -> Result<First, Failure> {
-        if self.is_ruled_out(&promises, at.0, x) {
+        let chooses = !self.plans.alternatives.is_empty() || self.visits(&promises) > 1;
+        if chooses || self.is_ruled_out(&promises, at.0, x) {
             return Err(Failure::Nothing);
         }
         promises.iter_mut().flatten().for_each(|promise| promise.reserve = 0.0);
         let search = |planner: &Planner<'_>| planner.beside(plan, factor).search(at.0, x);
         let plan = self.planned(&promises, at, u, search)?;
-        Ok(First { promises, plan, is_old: false })
+        Ok(First { promises, plan, let_go: Vec::new(), is_old: false })
     }
 
     /// `plan` keeps `promises` from `x` at `t`. Returns the part of the time until their deadlines that it needs for all of
@@ -253,7 +299,8 @@ impl Planning<'_> {
         );
         let mut part = 0.0_f64;
         for ((promise, slot), model) in promises.iter().zip(&self.rows.slots).zip(self.models()) {
-            let Some(promise) = promise.filter(|p| p.from > t && slot.begin == Begin::AtOnce) else {
+            let Some(promise) = promise.filter(|p| p.from > t && slot.promise.settings().deadline.is_some())
+            else {
                 continue;
             };
             let least = promise.margin.max(promise.reserve);

@@ -7,6 +7,7 @@
 //! | `status` | the report on a step |
 //! | `planning` | the planner for a set of promises |
 //! | `first` | the plan of a first sample, and the earliest deadlines that a plan keeps |
+//! | `schedule` | what a first sample may promise: alternatives, and the times of visits |
 //! | `sample` | a sample: what is promised, whether it is kept, and which source drives the plant |
 //! | `choice` | the input: the candidates, in order |
 //! | `bears` | what a plan bears of a plant that is not the model |
@@ -19,6 +20,7 @@ mod deviation;
 mod first;
 mod planning;
 mod sample;
+mod schedule;
 mod settings;
 mod state;
 mod status;
@@ -57,6 +59,8 @@ pub struct Plans {
     policies: Vec<Policy>,
     /// Pairs of barriers whose sets have no state in common.
     apart: Vec<[usize; 2]>,
+    /// Groups of alternatives, each the barriers that it consists of.
+    alternatives: Vec<Vec<Vec<usize>>>,
     /// What may be added to the rate of each state, and which part of each input arrives; empty for nothing and all.
     rates: Vec<f64>,
     gains: Vec<[f64; 2]>,
@@ -90,6 +94,7 @@ impl Plans {
             search_budget: Self::SEARCH_BUDGET,
             policies: Vec::new(),
             apart: Vec::new(),
+            alternatives: Vec::new(),
             rates: Vec::new(),
             gains: Vec::new(),
             lags: Vec::new(),
@@ -199,6 +204,33 @@ impl Plans {
         Self { apart: pairs, ..self }
     }
 
+    /// Adds a choice: of these alternatives, each the numbers of the barriers that it consists of, one is promised. The first
+    /// sample decides which, and lets the barriers of the others [go](crate::filter::Phase::Released). Every other barrier is
+    /// promised anyway. Default: no choice.
+    ///
+    /// ```
+    /// # use punctual_core::{barriers::DistanceDisc, filter::*};
+    /// # use punctual_core::plants::PointMass;
+    /// // To one of two places within 8 s: the second is nearer.
+    /// let disc = |x| DistanceDisc::new([x, 0.0], 1.0, 1.0);
+    /// let mut filter = Filter::builder(PointMass)
+    ///     .barrier("far", disc(50.0)?, BarrierSettings::within(8.0))?
+    ///     .barrier("near", disc(-10.0)?, BarrierSettings::within(8.0))?
+    ///     .bounds(&[-2.0; 2], &[2.0; 2])?
+    ///     .sampling(Sampling::Period(0.02))?
+    ///     .build()?
+    ///     .with_plans(Plans::every(0.02).one_of(&[&[0], &[1]]))?;
+    /// let mut u = [0.0; 2];
+    /// let report = filter.step(0.0, &[0.0; 4], &[0.0; 2], &mut u)?;
+    /// assert!(report.is_assured() && report.barriers[1].guaranteed && report.barriers[0].phase == Phase::Released);
+    /// # Ok::<(), punctual_core::Error>(())
+    /// ```
+    #[must_use]
+    pub fn one_of(mut self, alternatives: &[&[usize]]) -> Self {
+        self.alternatives.push(alternatives.iter().map(|barriers| barriers.to_vec()).collect());
+        self
+    }
+
     /// # Errors
     ///
     /// A period, horizon or budget out of range.
@@ -261,9 +293,10 @@ impl Filter {
     /// the guarantee is lost for that sample. A sample may be repeated at the same time, come early, or come late by a
     /// twentieth of a hold. If the time to the next sample changes and is [known](Self::expect_hold), a plan is sought for
     /// the new one; if none is found, the guarantee is lost. A sample that comes later suspends it until the next one. While
-    /// x is not finite, the plan continues as it is. A barrier without a deadline that [begins later](Begin::At) is promised
-    /// from then on. A filter with a bound on the disturbance of a barrier, a delay of more than 250 periods, or a deadline for a barrier that begins
-    /// later cannot be assured yet, and is refused. Sets must not move, unless [it is
+    /// x is not finite, the plan continues as it is. A barrier that [begins later](Begin::At) is promised
+    /// from then on; with a deadline, from its deadline on, wherever it begins. One that begins with
+    /// [another's arrival](Begin::AfterArrival) is promised from its deadline on, and the other one before that. A filter with
+    /// a bound on the disturbance of a barrier, or a delay of more than 250 periods, cannot be assured yet, and is refused. Sets must not move, unless [it is
     /// known](crate::barrier::Barrier::range_from) how low h gets: at an equilibrium each set is checked at eight later
     /// times, up to a day, and no plan is found if it has moved. With a [horizon](Plans::horizon) they may move, and the
     /// plant needs no equilibrium: the promise then has an [end](Assurance::until), which is postponed again and again.
@@ -292,8 +325,8 @@ impl Filter {
     /// # Errors
     ///
     /// A number of `plans` out of range; a filter that already has plans. A filter that cannot be assured: a barrier without
-    /// a model that can be run ahead, or with another plant than the first one; one with a deadline that begins later, one
-    /// that begins on another's arrival, or without a horizon one that moves for ever; a bound on the disturbance of a barrier;
+    /// a model that can be run ahead, or with another plant than the first one; one
+    /// without a deadline that begins on another's arrival, or without a horizon one that moves for ever; a bound on the disturbance of a barrier;
     /// a delay of more than 250 periods; an integrator, measured quantities beside the states, or a source without derivatives on enclosures for an
     /// uncertain plant. [`Self::obstacles`] lists them all.
     pub fn with_plans(mut self, plans: impl Into<Plans>) -> Result<Self, Error> {
@@ -366,6 +399,16 @@ impl Filter {
                 found.push(refused("motion", message));
             }
         }
+        for group in &plans.alternatives {
+            let unknown = group.iter().flatten().find(|i| **i >= rows.slots.len());
+            if group.is_empty() || unknown.is_some() {
+                let message = match unknown {
+                    Some(i) => format!("has barrier {i}, must have some of {} from 0", rows.slots.len()),
+                    None => "is empty, must have at least one alternative".into(),
+                };
+                found.push(refused("one_of", message));
+            }
+        }
         let states = self.model_states();
         for (i, slot) in rows.slots.iter().enumerate() {
             let mut refuse =
@@ -375,16 +418,13 @@ impl Filter {
                 refuse("disturbance", format!("is {}, must be 0 for a plan", settings.disturbance));
             }
             match (slot.begin, settings.deadline) {
-                (Begin::AtOnce, _) | (Begin::At(_), None) => {}
-                (Begin::At(begin), Some(_)) => {
-                    let message = format!("is {begin}, must be 0 for a plan where there is a deadline");
-                    refuse("begin", message);
-                }
-                (Begin::AfterArrival(_), _) => {
-                    refuse("begin", "is the arrival of another barrier, which no plan can predict".into());
+                (Begin::AtOnce | Begin::At(_), _) | (Begin::AfterArrival(_), Some(_)) => {}
+                (Begin::AfterArrival(_), None) => {
+                    let message = "is the arrival of another barrier, which needs a deadline for a plan: when it arrives is open";
+                    refuse("begin", message.into());
                 }
             }
-            if is_erring && slot.end == End::OnArrival {
+            if is_erring && !matches!(slot.end, End::Never | End::At(_)) {
                 refuse("end", "is on arrival, which a measurement with errors does not tell".into());
             }
             if let Some(follows) = slot.source.follows() {

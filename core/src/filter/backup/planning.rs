@@ -299,18 +299,23 @@ impl<'a> Planning<'a> {
             let h = model.value(t, x);
             // Slightly earlier, so that round-off of a time leaves no gap.
             let after = |seconds: f64| t - self.rows.delay + seconds - TOLERANCES.on_time * self.plans.period;
-            let from = match (slot.begin, slot.promise.settings().deadline) {
-                (Begin::At(begin), _) if begin > 0.0 => after(begin),
+            let deadline = slot.promise.settings().deadline.map(|deadline| factor(slot) * deadline);
+            let from = match (slot.begin, deadline) {
+                // What begins later may be left again until its deadline, wherever it begins.
+                (Begin::At(begin), deadline) if begin > 0.0 => after(deadline.unwrap_or(begin).max(begin)),
+                (Begin::AfterArrival(_), deadline) => after(deadline?),
                 // NaN is required at once, so that the check finds it.
                 _ if h.is_nan() || h >= self.unseen(model, t, x) => t,
-                (_, Some(deadline)) => after(factor(slot) * deadline),
+                (_, Some(deadline)) => after(deadline),
                 (_, None) if h >= 0.0 => t,
                 (_, None) => return None,
             };
             let until = match slot.end {
                 End::Never => f64::INFINITY,
                 End::At(seconds) => t - self.rows.delay + seconds,
-                End::OnArrival => from + self.plans.period,
+                End::OnArrival | End::AfterStay(_) => from + self.visit(slot)?,
+                // With that of the other, which `link` sets.
+                End::AfterArrival(_) => f64::INFINITY,
             };
             let soft = matches!(slot.strictness, Strictness::Soft(_));
             let margin = margin(model, t, x, h);
@@ -321,7 +326,45 @@ impl<'a> Planning<'a> {
             let reserve = if from == t { reserve.min(h / DECISIONS.ample) } else { reserve };
             (!soft && until > from).then_some(Promise { from, until, margin, firm, reserve })
         };
-        self.rows.slots.iter().zip(self.models()).map(promise).collect()
+        let mut promises: Vec<_> = self.rows.slots.iter().zip(self.models()).map(promise).collect();
+        self.link(&mut promises, t);
+        promises
+    }
+
+    /// How long in s a visit is planned to last: a sample longer than it has to, so that some sample sees it.
+    pub(super) fn visit(&self, slot: &BarrierSlot) -> Option<f64> {
+        let late = self.uncertainty.map_or(0.0, |of| of.jitter);
+        Some(slot.end.visit()? + (1.0 + late) * self.plans.period)
+    }
+
+    /// Makes those of `promises` from `t` on agree that begin or end with the arrival of another: what begins then is
+    /// promised after the other one, which is reached before; what ends then is promised until the other one is there.
+    pub(super) fn link(&self, promises: &mut [Option<Promise>], t: f64) {
+        let slots = &self.rows.slots;
+        // Each barrier was added after the one with which it begins.
+        for (i, slot) in slots.iter().enumerate().rev() {
+            let (Begin::AfterArrival(other), Some(Promise { from, .. })) = (slot.begin, promises[i]) else {
+                continue;
+            };
+            let visit = self.visit(&slots[other]);
+            let latest = from - visit.unwrap_or(0.0);
+            if let Some(first) = promises[other].as_mut().filter(|first| first.from > latest) {
+                first.from = latest.max(t);
+                first.until = visit.map_or(first.until, |visit| first.from + visit);
+            }
+        }
+        for (i, slot) in slots.iter().enumerate() {
+            if let Begin::AfterArrival(other) = slot.begin
+                && promises[other].is_none()
+            {
+                promises[i] = None;
+            }
+            if let (End::AfterArrival(other), Some(promise)) = (slot.end, promises[i]) {
+                // Rows see the arrival at that sample, or at the next one.
+                let until = promises[other].map(|other| other.from + 2.0 * self.plans.period);
+                promises[i] = until.map(|until| Promise { until, ..promise });
+            }
+        }
     }
 
     /// By how much h may be lower than at the measured state `x`.
@@ -333,20 +376,24 @@ impl<'a> Planning<'a> {
         gradient.iter().zip(errors).map(|(slope, error)| 2.0 * slope.abs() * error).sum()
     }
 
-    /// `promises` with each deadline at `part` of its time from the sample whose input acts from `t` on. Promises with a begin of their own are unchanged.
+    /// `promises` with each deadline at `part` of its time from the sample whose input acts from `t` on, but not before it
+    /// begins. Promises without a deadline are unchanged.
     pub(super) fn sooner(&self, promises: &[Option<Promise>], t: f64, part: f64) -> Vec<Option<Promise>> {
         let sooner = |(promise, slot): (&Option<Promise>, &BarrierSlot)| {
             let mut promise = (*promise)?;
-            if promise.from > t && slot.begin == Begin::AtOnce {
+            if promise.from > t && slot.promise.settings().deadline.is_some() {
                 let sample = t - self.rows.delay;
-                promise.from = sample + part * (promise.from - sample);
-                if slot.end == End::OnArrival {
-                    promise.until = promise.from + self.plans.period;
+                let begin = if let Begin::At(begin) = slot.begin { sample + begin } else { sample };
+                promise.from = (sample + part * (promise.from - sample)).max(begin.min(promise.from));
+                if let Some(visit) = self.visit(slot) {
+                    promise.until = promise.from + visit;
                 }
             }
             Some(promise)
         };
-        promises.iter().zip(&self.rows.slots).map(sooner).collect()
+        let mut sooner: Vec<_> = promises.iter().zip(&self.rows.slots).map(sooner).collect();
+        self.link(&mut sooner, t);
+        sooner
     }
 
     /// `longest`, or the largest factor for which no deadline chosen by `scales` comes after the end of its barrier.
@@ -367,10 +414,10 @@ impl<'a> Planning<'a> {
             let (p, q) = (promises.get(a).copied().flatten()?, promises.get(b).copied().flatten()?);
             // A set that is released on arrival has to be reached at some unknown time before its deadline.
             let [of_p, of_q] = [(a, p), (b, q)].map(|(i, promise)| match slots[i].end {
-                End::OnArrival => (t, promise.from + self.plans.period),
+                End::OnArrival | End::AfterStay(_) => (t, promise.until),
                 _ => (promise.from, promise.until),
             });
-            let is_apart = match [a, b].map(|i| slots[i].end == End::OnArrival) {
+            let is_apart = match [a, b].map(|i| slots[i].end.visit().is_some()) {
                 [true, true] => false,
                 [true, false] => q.from <= t && q.until >= of_p.1,
                 [false, true] => p.from <= t && p.until >= of_q.1,

@@ -13,7 +13,7 @@ use crate::MAX_INPUTS;
 use crate::convergence::FixedTimeState;
 use crate::filter::integrator::Integrator;
 use crate::filter::rows::{BarrierSlot, End, Rows, Workspace};
-use crate::filter::{Infeasible, Phase, Status};
+use crate::filter::{BarrierReport, Infeasible, Phase, Status};
 use crate::plan::{
     BackupPlan, Course, Failure, Plan, Planner, SearchProgress, TOLERANCES, Uncertainty, slopes,
 };
@@ -117,6 +117,7 @@ impl Decision<'_> {
                 self.next().plan = Plan::default();
             }
         }
+        self.confirm_stays(at, u);
         if self.now().status == AssuranceStatus::Assured
             && is_valid
             && let Some(failure) = self.exposed(at, u)
@@ -180,7 +181,8 @@ impl Decision<'_> {
             planning.waits(&first.promises, self.measured, &acting).map(|()| (factor, first))
         });
         match found {
-            Ok((factor, First { promises, plan, is_old })) => {
+            Ok((factor, First { promises, plan, let_go, is_old })) => {
+                self.let_go(&let_go);
                 let courses = self.planning().rests_on(t, &promises);
                 let next = self.next();
                 (next.promises, next.plan, next.courses) = (promises, plan, courses);
@@ -192,11 +194,24 @@ impl Decision<'_> {
                 !is_old
             }
             Err(failure) => {
+                // The rows go for the first alternatives.
+                let others: Vec<usize> = self.planning().choices().next().unwrap_or_default();
+                self.let_go(&others);
                 let next = self.next();
                 (next.promises, next.plan) = (promises, Plan::default());
                 self.end(AssuranceStatus::Refused, Some(failure));
                 true
             }
+        }
+    }
+
+    /// Lets the barriers of alternatives go that are not taken.
+    fn let_go(&mut self, barriers: &[usize]) {
+        let Workspace { next, report, .. } = &mut self.rows.workspace;
+        for &i in barriers {
+            (next.barriers[i].phase, next.barriers[i].unmet) = (Phase::Released, None);
+            report.barriers[i] = BarrierReport { h: report.barriers[i].h, ..BarrierReport::BLANK };
+            report.barriers[i].remember(&next.barriers[i]);
         }
     }
 
@@ -303,9 +318,42 @@ impl Decision<'_> {
     fn release(&mut self) {
         let Rows { slots, workspace: Workspace { next, report, .. }, .. } = &mut *self.rows;
         for ((promise, slot), b) in next.plan.promises.iter_mut().zip(slots).zip(&report.barriers) {
-            if slot.end == End::OnArrival && b.phase == Phase::Released {
+            if !matches!(slot.end, End::Never | End::At(_)) && b.phase == Phase::Released {
                 *promise = None;
             }
+        }
+    }
+
+    /// Begins a stay again that may be broken between this sample and the next one: before its time no plan accounts for it.
+    fn confirm_stays(&mut self, At { t, hold, x }: At<'_>, u: &[f64]) {
+        let promises = &self.now().promises;
+        let mut inside = [0.0; MAX_INPUTS];
+        inside[..u.len()].copy_from_slice(u);
+        let is_open = |(i, promise): (usize, &Option<Promise>)| {
+            let is_early = promise.is_some_and(|promise| promise.from > t);
+            let next = &self.rows.workspace.next.barriers[i];
+            if !is_early || next.since.is_none() {
+                return None;
+            }
+            let mut alone = alloc::vec![None; promises.len()];
+            alone[i] = promise.map(|promise| Promise {
+                from: t,
+                until: f64::INFINITY,
+                margin: 0.0,
+                reserve: 0.0,
+                ..promise
+            });
+            let stays = self.uncertainty.is_none()
+                && self.rows.delay == 0.0
+                && self
+                    .planning()
+                    .planned(&alone, (t, hold), u, |planner| planner.holds(t, x, &[(hold, inside)]))
+                    .is_ok();
+            (!stays).then_some(i)
+        };
+        let broken: Vec<usize> = promises.iter().enumerate().filter_map(is_open).collect();
+        for i in broken {
+            self.rows.workspace.next.barriers[i].since = None;
         }
     }
 

@@ -48,6 +48,20 @@ pub(super) struct DecisionSettings {
     /// The part of the time until the end of a plan after which the filter tries again to prolong it, if that failed before.
     pub(super) sooner: f64,
 
+    // Missions.
+    /// The largest number of ways to take alternatives that are compared, and of those that are tried.
+    pub(super) most_choices: usize,
+    pub(super) choices: usize,
+    /// The largest number of visits of which every order is compared, and the number of orders that are tried.
+    pub(super) all_orders: usize,
+    pub(super) orders: usize,
+    /// How much more time the way to a place gets that was not reached, and how often.
+    pub(super) slower: f64,
+    pub(super) repairs: u32,
+    /// The slowest and the fastest pace in lengths of the path per s, and halvings between them.
+    pub(super) paces: [f64; 2],
+    pub(super) halvings: u32,
+
     // Time.
     /// How late a measured clock may be, as a part of a hold. Two intervals that differ by no more are meant to be the same.
     pub(super) jitter: f64,
@@ -138,6 +152,19 @@ pub(super) const DECISIONS: DecisionSettings = DecisionSettings {
     // attempt costs as much as a first search: with less there are more of them, with more a plan that appears late is
     // missed.
     sooner: 0.25,
+
+    // A comparison of a way takes microseconds to milliseconds, with many visits; a trial as long as a first search, up to seconds.
+    most_choices: 4096,
+    choices: 8,
+    // 720 orders of six visits; of more, the nearest one is next.
+    all_orders: 6,
+    orders: 2,
+    // A plant at rest needs longer for the first metres, and a distance does not say so.
+    slower: 1.5,
+    repairs: 3,
+    // From a millionth of a second to a fortnight for the whole path; the times are known to a millionth of that.
+    paces: [1e-6, 1e6],
+    halvings: 48,
 
     // A measured clock may jitter by a few percent (docs/guarantees.md). With more, a late sample is not noticed, and the
     // plant has moved on unplanned by that much; with less, jitter ends guarantees (`a_measured_clock_keeps_the_promise`).

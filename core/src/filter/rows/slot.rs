@@ -48,6 +48,21 @@ pub enum End {
     At(f64),
     /// Until h ≥ 0 has been reached.
     OnArrival,
+    /// Until h ≥ 0 has held for this many seconds without a break, finite, > 0.
+    AfterStay(f64),
+    /// Until the arrival of the barrier of this number, counted from 0: "out of B until A has been reached".
+    AfterArrival(usize),
+}
+
+impl End {
+    /// How long in s a visit lasts that ends the promise, if one does; its time is open.
+    pub(crate) fn visit(self) -> Option<f64> {
+        match self {
+            Self::OnArrival => Some(0.0),
+            Self::AfterStay(seconds) => Some(seconds),
+            Self::Never | Self::At(_) | Self::AfterArrival(_) => None,
+        }
+    }
 }
 
 /// How a barrier's constraint is treated if not all can be met within the input bounds.
@@ -292,8 +307,11 @@ impl BarrierSlot {
     /// is.
     #[inline]
     pub(crate) fn in_force(&self, barriers: &mut [FixedTimeState], index: usize, t: f64, h: f64) -> bool {
-        let begun = !matches!(barriers[index].phase, Phase::Waiting | Phase::Released);
-        begun && self.end == End::Never || self.is_due(barriers, index, t, h)
+        match barriers[index].phase {
+            Phase::Released => false,
+            Phase::Waiting => self.is_due(barriers, index, t, h),
+            _ => self.end == End::Never || self.is_due(barriers, index, t, h),
+        }
     }
 
     fn is_due(&self, barriers: &mut [FixedTimeState], index: usize, t: f64, h: f64) -> bool {
@@ -305,13 +323,21 @@ impl BarrierSlot {
                 Begin::At(seconds) => reached(seconds),
                 Begin::AfterArrival(other) => barriers[other].arrival.is_some(),
             };
+        let has_arrived = |other: usize| barriers.get(other).is_some_and(|b| b.arrival.is_some());
+        let is_other_there = matches!(self.end, End::AfterArrival(other) if has_arrived(other));
         let promise = &mut barriers[index];
         let ended = match self.end {
             End::Never => false,
             End::At(seconds) => reached(seconds),
             End::OnArrival => begun && (h >= 0.0 || promise.arrival.is_some()),
+            End::AfterStay(seconds) => {
+                promise.since = if begun && h >= 0.0 { promise.since.or(Some(t)) } else { None };
+                let slack = SAME_TIME * t.abs().max(seconds);
+                promise.since.is_some_and(|since| t - since >= seconds - slack)
+            }
+            End::AfterArrival(_) => is_other_there,
         };
-        if ended && promise.phase != Phase::Released {
+        if ended {
             promise.phase = Phase::Released;
             promise.unmet = None;
             if h >= 0.0 {
