@@ -49,6 +49,8 @@ pub enum Verdict {
     Open,
     /// It began outside and has no deadline: there is no promise.
     Nothing,
+    /// It was let go before it began: another alternative was taken, or what it waited for was there.
+    LetGo,
 }
 
 /// The facts seen of a barrier, and the verdict that follows.
@@ -82,6 +84,8 @@ pub struct Judgement {
     reached: bool,
     /// Whether it was outside at one of them.
     outside: bool,
+    /// Whether it was let go before it began.
+    let_go: bool,
 }
 
 impl Judgement {
@@ -107,6 +111,7 @@ impl Judgement {
     /// The verdict on the promise.
     pub fn verdict(&self) -> Verdict {
         match () {
+            () if self.let_go => Verdict::LetGo,
             () if self.began.is_some() && !self.began_inside && self.deadline.is_none() => Verdict::Nothing,
             () if self.outside || self.late.is_some() => Verdict::Broken,
             () if self.on_time() && self.inside() && self.is_complete() => Verdict::Kept,
@@ -192,6 +197,7 @@ impl Judge {
         self.judge_deadline(t, h);
         self.count_in(t, h, promise_state);
         self.released = promise_state == PromiseState::Released;
+        self.seen.let_go = self.released && self.seen.began.is_none();
         // Released after it arrived: there is nothing more to reach.
         self.seen.reached |= self.released && self.seen.arrival.is_some();
         self.before.rotate_right(1);
@@ -214,7 +220,7 @@ impl Judge {
     }
 
     fn begin(&mut self, t: f64, h: f64, promise_state: PromiseState) {
-        if promise_state != PromiseState::Waiting && self.seen.began.is_none() {
+        if promise_state == PromiseState::InForce && self.seen.began.is_none() {
             self.seen.began = Some(t);
             self.seen.began_inside = self.is_inside(h) && (self.count == 0 || self.deadline.is_none());
         }

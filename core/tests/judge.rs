@@ -76,6 +76,37 @@ fn nothing_is_promised_from_outside_without_a_deadline() {
     assert_eq!((seen.verdict(), seen.on_time(), seen.inside()), (Verdict::Nothing, false, false));
 }
 
+/// An alternative that is not taken, and one that is, at first.
+#[test]
+fn what_is_let_go_before_it_begins_is_no_promise() {
+    for (first, verdict) in [(PromiseState::Waiting, Verdict::LetGo), (PromiseState::InForce, Verdict::Open)]
+    {
+        let mut judge = Judge::new(Some(5.0), Interpolation::Straight);
+        judge.see(0.0, -1.0, first, false);
+        judge.see(0.1, -1.0, PromiseState::Released, false);
+        judge.see(9.0, -1.0, PromiseState::Released, false);
+        assert_eq!(judge.judgement().verdict(), verdict);
+    }
+}
+
+/// What begins later and has a deadline may be left until then, wherever it begins.
+#[test]
+fn what_begins_later_counts_from_its_deadline() {
+    let seen = |h: fn(f64) -> f64| {
+        let mut judge = Judge::new(Some(5.0), Interpolation::Straight);
+        for k in 0..=80_u32 {
+            let t = 0.1 * f64::from(k);
+            let state = if t < 1.95 { PromiseState::Waiting } else { PromiseState::InForce };
+            judge.see(t, h(t), state, false);
+        }
+        judge.judgement()
+    };
+    let back = seen(|t| if (3.0..4.0).contains(&t) { -1.0 } else { 1.0 });
+    assert_eq!((back.verdict(), back.began_inside), (Verdict::Kept, false));
+    let left = seen(|t| if (6.0..7.0).contains(&t) { -1.0 } else { 1.0 });
+    assert_eq!(left.verdict(), Verdict::Broken);
+}
+
 /// Before the deadline a barrier that began outside may be left again; what counts is from then on.
 #[test]
 fn arriving_and_leaving() {

@@ -132,7 +132,7 @@ prop_compose! {
         phase in prop::sample::select(Phase::ALL.to_vec()),
         n in prop::array::uniform32(number()),
         anchor in prop::array::uniform8(number()),
-        options in prop::array::uniform3(prop::option::of(number())),
+        options in prop::array::uniform4(prop::option::of(number())),
         counts in prop::array::uniform3(any::<u32>()),
         flags in prop::array::uniform2(any::<bool>()),
     ) -> FixedTimeState {
@@ -154,6 +154,7 @@ prop_compose! {
             period: n[8],
             fallback: flags[0],
             arrival: options[1],
+            since: options[3],
             on_course: flags[1],
             unmet: options[2].map(|since| Unmet { steps: counts[2], since, h: n[9] }),
         }

@@ -19,7 +19,7 @@ class Promise:
     """Findings on one barrier: its promise, which is about h, and its constraint, which is about steps."""
 
     promise: str
-    """`kept`, `broken`, `open` (the run ends before it is decided) or `nothing_promised`."""
+    """`kept`, `broken`, `open` (the run ends before it is decided), `nothing_promised`, or `let_go` (another alternative was taken)."""
     deadline: float | None
     """The instant of the deadline in s; `None` without one."""
     began_inside: bool

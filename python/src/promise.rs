@@ -42,6 +42,7 @@ pub(crate) fn judge<'py>(
         Verdict::Broken => "broken",
         Verdict::Open => "open",
         Verdict::Nothing => "nothing_promised",
+        Verdict::LetGo => "let_go",
     };
     let said = PyDict::new(py);
     said.set_item("promise", word)?;

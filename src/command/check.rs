@@ -155,6 +155,7 @@ impl StartReport {
     /// The findings on the first step and the closed loop, as text.
     fn words(&self) -> String {
         match (self.on_course, self.simulated) {
+            (_, Some(Kept::LetGo)) => "let go: another alternative is taken",
             _ if self.guaranteed => {
                 let until =
                     self.guaranteed_until.map(|until| format!(" until {} s", output::number_below(until)));
@@ -472,13 +473,15 @@ fn filter(
         };
         let simulated = closed_loop.as_ref().map(|run| run.barriers[i].promise);
         let planned = backup_plan.as_ref().filter(|backup_plan| c.is_assured() && backup_plan.covers(name));
-        let guaranteed = planned.is_some_and(|backup_plan| backup_plan.keeps(name));
+        // Another alternative is taken.
+        let is_let_go = simulated == Some(Kept::LetGo);
+        let guaranteed = !is_let_go && planned.is_some_and(|backup_plan| backup_plan.keeps(name));
         let start = report.map(|b| StartReport {
             h: b.h,
             inside: b.h >= -ROUND_OFF,
             promised: match planned {
-                Some(_) => guaranteed,
-                None => b.on_course && simulated.is_none_or(|seen| seen == Kept::Kept),
+                Some(_) => guaranteed || is_let_go,
+                None => b.on_course && simulated.is_none_or(Kept::is_done),
             },
             guaranteed,
             guaranteed_until: backup_plan.as_ref().filter(|_| guaranteed).and_then(BackupPlanReport::until),

@@ -90,7 +90,7 @@ impl Requirement {
         match self {
             Self::Nothing => true,
             Self::Unbroken => promise.promise != Kept::Broken,
-            Self::OnTimeAndInside => promise.promise == Kept::Kept,
+            Self::OnTimeAndInside => promise.promise.is_done(),
             Self::Kept => promise.kept(),
             Self::Guaranteed => promise.kept() && promise.guaranteed == Some(true),
         }
@@ -494,7 +494,7 @@ fn text(report: &Report, signals: bool) -> String {
     if let Some((verdict, sentence)) = coupling::verdict(&report.promises) {
         let sentence = match verdict {
             Kept::Kept | Kept::Broken => output::verdict(&sentence, verdict == Kept::Kept),
-            Kept::Open | Kept::NothingPromised => sentence,
+            Kept::Open | Kept::NothingPromised | Kept::LetGo => sentence,
         };
         let changed: String = report.interference.iter().map(|of| of.text() + "\n").collect();
         text += &format!("\n\n{}{changed}{sentence}", promises_text(&report.promises));
@@ -521,7 +521,7 @@ fn remarks(promises: &[Promise]) -> impl Iterator<Item = String> + '_ {
 /// A verdict, coloured for a terminal.
 pub(super) fn shown(promise: Kept) -> String {
     match promise {
-        Kept::Open => promise.words().to_owned(),
+        Kept::Open | Kept::LetGo => promise.words().to_owned(),
         _ => output::verdict(promise.words(), promise == Kept::Kept),
     }
 }

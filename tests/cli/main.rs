@@ -25,6 +25,7 @@ mod judging;
 mod late;
 mod merging;
 mod misbehaving;
+mod missions;
 mod mistakes;
 mod models;
 mod packing;

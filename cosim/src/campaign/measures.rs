@@ -7,7 +7,7 @@ use punctual_fmu::configuration::Configuration;
 
 use super::file::{Campaign, Choice, Success};
 use super::table::{Cell, Column, Kind, Row};
-use crate::coupling::{Kept, Promise, Simulation};
+use crate::coupling::{Promise, Simulation};
 use crate::error::Error;
 
 /// A filter of the system.
@@ -321,7 +321,7 @@ impl Measures {
                     // The filter sees the plant with the errors of its measurement. The promise is of the plant as it is.
                     _ if filter.declared.is_some() => true,
                     Success::Kept => kept,
-                    Success::OnTimeAndInside => promise.is_some_and(|p| p.promise == Kept::Kept),
+                    Success::OnTimeAndInside => promise.is_some_and(|p| p.promise.is_done()),
                 };
                 row.extend([
                     Cell::Number(promise.and_then(|p| p.arrival)),

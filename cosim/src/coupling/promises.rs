@@ -35,9 +35,16 @@ pub enum Kept {
     Open,
     /// It began outside and has no deadline.
     NothingPromised,
+    /// It was let go before it began: another alternative was taken, or what it waited for was there.
+    LetGo,
 }
 
 impl Kept {
+    /// Whether nothing is left to be done: it was kept, or let go.
+    pub fn is_done(self) -> bool {
+        matches!(self, Self::Kept | Self::LetGo)
+    }
+
     /// The verdict as text.
     pub fn words(self) -> &'static str {
         match self {
@@ -45,6 +52,7 @@ impl Kept {
             Self::Broken => "not kept",
             Self::Open => "open",
             Self::NothingPromised => "nothing promised",
+            Self::LetGo => "let go",
         }
     }
 }
@@ -53,7 +61,7 @@ impl Kept {
 pub fn verdict(promises: &[Promise]) -> Option<(Kept, String)> {
     let count = |verdict| promises.iter().filter(|p| p.promise == verdict).count();
     let (broken, kept) = (count(Kept::Broken), count(Kept::Kept));
-    Some(match (broken, promises.len()) {
+    Some(match (broken, promises.len() - count(Kept::LetGo)) {
         (_, 0) => return None,
         (0, all) if kept == all => (Kept::Kept, "Every promise is kept.".to_owned()),
         (0, all) => (Kept::Open, format!("{kept} of {all} promises are kept, none is broken.")),
@@ -69,6 +77,7 @@ impl From<Verdict> for Kept {
             Verdict::Broken => Self::Broken,
             Verdict::Open => Self::Open,
             Verdict::Nothing => Self::NothingPromised,
+            Verdict::LetGo => Self::LetGo,
         }
     }
 }
@@ -117,7 +126,7 @@ pub struct Promise {
 impl Promise {
     /// Whether the promise is kept and every sample met the constraint.
     pub fn kept(&self) -> bool {
-        self.promise == Kept::Kept && self.constraint_met
+        self.promise.is_done() && self.constraint_met
     }
 
     /// Takes over a judgement on h.

@@ -82,6 +82,14 @@ impl FilterConfiguration {
         let is_same = mixed_degree.is_empty() && !self.leaves_errors_to_plans();
         let is_certain = self.is_assured() || built.is_ok() && is_same;
         let filter = if is_certain { built } else { self.build() }?;
+        if let (Backing::RowsOnly(reason), Some(i)) =
+            (&self.findings.backing, self.barrier.iter().position(|b| b.choice.is_some()))
+        {
+            let message = format!(
+                "only plans can choose, and none are followed: {reason}. Change that, or leave the choice out"
+            );
+            return Err(ConfigurationError::new(format!("barrier[{i}].choice"), message));
+        }
         if let (Backing::RowsOnly(reason), Some(_)) = (&self.findings.backing, &self.uncertainty) {
             let message = format!(
                 "only plans account for it, and none are followed: {reason}. Change that, or leave `[uncertainty]` out"
@@ -209,12 +217,38 @@ impl FilterConfiguration {
         }
     }
 
+    /// The choices: of each the alternatives, each the numbers of its barriers.
+    fn choices(&self) -> Vec<Vec<Vec<usize>>> {
+        let mut names: Vec<&str> = Vec::new();
+        let mut choices: Vec<Vec<Vec<usize>>> = Vec::new();
+        for (i, section) in self.barrier.iter().enumerate() {
+            let Some(name) = &section.choice else { continue };
+            let choice = names.iter().position(|other| other == name).unwrap_or_else(|| {
+                names.push(name);
+                choices.push(Vec::new());
+                names.len() - 1
+            });
+            let is_beside = |alternative: &&mut Vec<usize>| {
+                let other = alternative.first().and_then(|first| self.barrier[*first].alternative.as_ref());
+                other.is_some() && other == section.alternative.as_ref()
+            };
+            match choices[choice].iter_mut().find(is_beside) {
+                Some(alternative) => alternative.push(i),
+                None => choices[choice].push(vec![i]),
+            }
+        }
+        choices
+    }
+
     /// How plans are made, but for a policy.
     fn plans(&self) -> Plans {
         let plans = Plans::every(self.experiment.step_size)
             .horizon(self.plan_horizon)
             .search_budget(self.search_budget.unwrap_or(Plans::SEARCH_BUDGET))
             .apart(self.apart());
+        let plans = self.choices().iter().fold(plans, |plans, alternatives| {
+            plans.one_of(&alternatives.iter().map(Vec::as_slice).collect::<Vec<_>>())
+        });
         let plans = match self.leaves_errors_to_plans() {
             true => plans.measurement_errors(&self.errors()[..self.plant.states().len()]),
             false => plans,

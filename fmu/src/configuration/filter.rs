@@ -14,7 +14,7 @@ use super::barrier::RawBarrier;
 use super::key::{
     Key, Section,
     Unit::{Is, Of},
-    Value::{Count, Flag, Name, Number, NumberByName, PairByName, Table, Tables, TextByName, Word},
+    Value::{Count, Flag, Name, Number, NumberByName, PairByName, Table, Tables, Text, TextByName, Word},
 };
 use super::model::RawModel;
 use super::names::{Named, check_identifier, check_known, is_reserved, taken};
@@ -75,6 +75,7 @@ pub(super) struct RawFilter {
     integrator: Option<IntegratorSection>,
     policy: Option<BTreeMap<String, String>>,
     barrier: Vec<RawBarrier>,
+    mission: Option<String>,
     #[serde(default)]
     bounds: BTreeMap<String, [f64; 2]>,
     #[serde(default)]
@@ -179,7 +180,7 @@ fn correction_limit() -> f64 {
 pub(super) static SECTION: Section = Section {
     name: "filter",
     keys: || {
-        static KEYS: [Key; 24] = [
+        static KEYS: [Key; 25] = [
             Key::new("kind", Word(&["filter"]), None, ""),
             Key::new("name", Name, Some("`filter`"), "the FMU's name"),
             Key::new("plant", Table(&model::PLANT), None, "[the model](#models) that the filter is for"),
@@ -189,6 +190,13 @@ pub(super) static SECTION: Section = Section {
                 PairByName(Of("unit of the input")),
                 Some("none"),
                 "`[min, max]` of any input. Never relaxed",
+            ),
+            Key::new(
+                "mission",
+                Text,
+                Some("none"),
+                "[where to be and when](#missions), in signal temporal logic, such as `F[0,5] A & F[5,12] B & G !C`; the names are those of \
+                 barriers, which then say only where that is",
             ),
             Key::new(
                 "sampling",
@@ -368,7 +376,13 @@ impl FilterConfiguration {
             kind: raw.kind,
             name,
             direct_feedthrough: raw.direct_feedthrough,
-            barrier: barriers(raw.barrier, &plant)?,
+            barrier: barriers(
+                match &raw.mission {
+                    None => raw.barrier,
+                    Some(text) => barrier::of_mission(text, raw.barrier, raw.experiment.step_size)?,
+                },
+                &plant,
+            )?,
             sampling: raw.sampling.unwrap_or(match plant.is_external() {
                 true => SamplingName::Pointwise,
                 false => SamplingName::Measured,
@@ -770,13 +784,29 @@ impl FilterConfiguration {
             (None, Some(begin)) if begin > 0.0 => Begin::At(begin),
             (None, _) => Begin::AtOnce,
         };
-        let end = match (section.until_arrival, section.end) {
-            (true, Some(end)) => {
-                return refuse("end", format!("is {end}, must be 0 beside `until_arrival`"));
-            }
-            (true, None) => End::OnArrival,
-            (false, Some(end)) if end > 0.0 => End::At(end),
-            (false, _) => End::Never,
+        let (stay, end) = (section.stay.filter(|stay| *stay > 0.0), section.end.filter(|end| *end > 0.0));
+        let ends = [
+            ("until_arrival", section.until_arrival),
+            ("stay", stay.is_some()),
+            ("until", section.until.is_some()),
+        ];
+        let mut given = ends.iter().filter(|(_, is_given)| *is_given).map(|(key, _)| *key);
+        let (first, second) = (given.next(), given.next());
+        if let (Some(first), Some(second)) = (first, second) {
+            return refuse(second, format!("given beside `{first}`, must be without: each is an end"));
+        }
+        if let (Some(first), Some(end)) = (first, section.end) {
+            return refuse("end", format!("is {end}, must be 0 beside `{first}`"));
+        }
+        let end = match (stay, &section.until, end) {
+            (Some(stay), ..) => End::AfterStay(stay),
+            (_, Some(name), _) => match self.barrier.iter().position(|b| b.name == *name) {
+                Some(other) if other != index => End::AfterArrival(other),
+                _ => return refuse("until", format!("is {name:?}, must be the name of another barrier")),
+            },
+            _ if section.until_arrival => End::OnArrival,
+            (.., Some(end)) => End::At(end),
+            (.., None) => End::Never,
         };
         Ok((begin, end))
     }

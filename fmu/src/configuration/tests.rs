@@ -48,6 +48,26 @@ radius = 2.0
 deadline = 10.0
 "#;
 
+const MISSION: &str = r#"
+kind = "filter"
+mission = "F[0,5] A & G !C"
+plant = { model = "unicycle" }
+bounds = { a = [-9.0, 8.0], omega = [-2.0, 2.0] }
+[[barrier]]
+name = "A"
+centre = [1.0, 2.0]
+radius = 1.0
+[[barrier]]
+name = "C"
+shape = "rectangle"
+centre = [8.0, 2.0]
+half_sides = [1.0, 2.0]
+[[barrier]]
+name = "rest"
+shape = "speed_limit"
+bound = 3.0
+"#;
+
 const HEADING: &str = r#"
 kind = "controller"
 controller = "heading"
@@ -254,6 +274,28 @@ defects! {
         "barrier[0].end: is 4, must be >= deadline = 10, the promise to keep";
     two_ends: FILTER, "radius = 2.0" => "radius = 2.0\nuntil_arrival = true\nend = 4.0",
         "barrier[0].end: is 4, must be 0 beside `until_arrival`";
+    a_stay_beside_an_end: FILTER, "radius = 2.0" => "radius = 2.0\nstay = 2.0\nend = 14.0",
+        "barrier[0].end: is 14, must be 0 beside `stay`";
+    a_stay_beside_an_arrival: FILTER, "radius = 2.0" => "radius = 2.0\nstay = 2.0\nuntil_arrival = true",
+        "barrier[0].stay: given beside `until_arrival`, must be without: each is an end";
+    a_negative_stay: FILTER, "radius = 2.0" => "radius = 2.0\nstay = -2.0",
+        "barrier[0].stay: is -2, must be finite and >= 0";
+    until_itself: FILTER, "radius = 2.0" => "radius = 2.0\nuntil = \"goal\"",
+        "barrier[0].until: is \"goal\", must be the name of another barrier";
+    a_choice_without_plans: MISSION, "G !C" => "(G !C | F[0,9] A)\"\nassurance = \"off",
+        "barrier[1].choice: only plans can choose, and none are followed: assurance is \"off\". Change that, or leave the choice out";
+    a_mission_of_a_place_that_is_nowhere: MISSION, "G !C" => "G !D",
+        "mission: has D, which is no barrier, must be one of A, C, rest";
+    a_mission_beside_times: MISSION, "centre = [1.0, 2.0]" => "centre = [1.0, 2.0]\ndeadline = 3.0",
+        "barrier[0].deadline: stands beside a mission that says when: leave it out, or A out of the mission";
+    a_mission_to_be_in_two_places: MISSION, "G !C" => "F[0,4] (A & !C)",
+        "mission: has a visit of A & !C at the same time, must be of one: give a barrier that is all of them, such as an \
+         `expression` with min";
+    a_mission_outside_of_a_limit: MISSION, "G !C" => "G !rest",
+        "mission: has !rest, a speed_limit, of which there is no outside: give a barrier that is it";
+    a_visit_that_waits_too_long: MISSION, "F[0,5] A" => "F[0,5] (A & F[2,3] C)",
+        "mission: has a visit 2 to 3 s after that of A, which may be 0 to 5 s from the start: that leaves no time that suits all \
+         of them; make the window of A narrower, or this one longer";
     rates_of_another_number: FILTER, "radius = 2.0" => "radius = 2.0\nrates = [1.0, 2.0, 3.0]",
         "barrier[0].rates: has 3 components, must have 2, the relative degree";
     a_rate_beside_rates: FILTER, "radius = 2.0" => "radius = 2.0\nrates = [1.0, 2.0]\nrate = 1.0",
@@ -324,6 +366,58 @@ fn duplicate_barrier_name() {
     let barrier = &FILTER[FILTER.find("[[barrier]]").unwrap()..];
     let error = Configuration::parse(&format!("{FILTER}{barrier}")).unwrap_err().to_string();
     assert_eq!(error, "barrier[1].name: is \"goal\", which is already the name of something else");
+}
+
+/// A mission is short for barriers with times.
+#[test]
+fn a_mission_is_its_barriers() {
+    let barriers = |text: &str| match Configuration::parse(text).expect("a filter") {
+        Configuration::Filter(filter) => filter.barrier,
+        other => panic!("{other:?}"),
+    };
+    let mission = |tasks: &str| barriers(&MISSION.replace("F[0,5] A & G !C", tasks));
+    let closed = |keys: &str| {
+        format!(
+            "[[barrier]]\nname = \"C\"\nshape = \"rectangular_obstacle\"\ncentre = [8.0, 2.0]\nhalf_sides = [1.0, 2.0]\n{keys}"
+        )
+    };
+    let of_a = |tasks: &str, a: &str, c: &str| {
+        let wanted = barriers(&format!(
+            "kind = \"filter\"\nplant = {{ model = \"unicycle\" }}\nbounds = {{ a = [-9.0, 8.0], omega = [-2.0, 2.0] }}\n\
+             [[barrier]]\nname = \"A\"\ncentre = [1.0, 2.0]\nradius = 1.0\n{a}\n{}\n\
+             [[barrier]]\nname = \"rest\"\nshape = \"speed_limit\"\nbound = 3.0\n",
+            closed(c)
+        ));
+        assert_eq!(mission(tasks), wanted, "{tasks}");
+    };
+    of_a("F[0,5] A & G !C", "deadline = 5.0\nuntil_arrival = true", "");
+    of_a(
+        "F[2,5] A & G[3,4] !C",
+        "begin = 2.0\ndeadline = 5.0\nuntil_arrival = true",
+        "begin = 3.0\nend = 4.0",
+    );
+    of_a("F[2,5] G[0,1.5] A & G !C", "begin = 2.0\ndeadline = 5.0\nstay = 1.5", "");
+    // Where it is reached at first, it may be left before its deadline.
+    of_a("F[0,5] G A & G !C", "begin = 0.001\ndeadline = 5.0", "");
+    of_a("!C U[1,5] A", "begin = 1.0\ndeadline = 5.0\nuntil_arrival = true", "until = \"A\"");
+    of_a(
+        "F[0,5] A | G !C",
+        "deadline = 5.0\nuntil_arrival = true\nchoice = \"choice_1\"\nalternative = \"alternative_1\"",
+        "choice = \"choice_1\"\nalternative = \"alternative_2\"",
+    );
+    // One after the other, and a place twice.
+    let both = mission("F[1,4] (A & F[0,6] C) & G !C");
+    let times: Vec<_> =
+        both.iter().map(|b| (b.name.as_str(), b.begin, b.deadline, b.after.as_deref())).collect();
+    assert_eq!(
+        times,
+        [
+            ("A", Some(1.0), Some(4.0), None),
+            ("C", None, Some(7.0), Some("A")),
+            ("C_2", None, None, None),
+            ("rest", None, None, None)
+        ]
+    );
 }
 
 #[test]

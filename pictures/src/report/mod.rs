@@ -256,7 +256,7 @@ fn class(kept: Kept) -> &'static str {
     match kept {
         Kept::Kept => "word good",
         Kept::Broken => "word bad",
-        Kept::Open => "word open",
+        Kept::Open | Kept::LetGo => "word open",
         Kept::NothingPromised => "word nothing",
     }
 }

@@ -55,7 +55,7 @@ const fn plain(
     Row { key: Key::new(name, value, default, meaning), parameters: &[] }
 }
 
-static KEYS: [Row; 36] = [
+static KEYS: [Row; 40] = [
     plain("name", Name, None, "unique; the prefix of its variables"),
     plain(
         "shape",
@@ -211,6 +211,33 @@ static KEYS: [Row; 36] = [
         parameters: &[whole("time from the first step until it is released; 0: never", |b| b.end.as_mut())],
     },
     plain("until_arrival", Flag, Some("`false`"), "released once it has been reached"),
+    Row {
+        key: Key {
+            name: "stay",
+            value: Number(S, Range::NON_NEGATIVE),
+            default: Some("0"),
+            meaning: "released once it has been kept for this long; it is reached by `deadline`, and left after that; 0: no such end",
+        },
+        parameters: &[whole("how long it is kept before it is released", |b| b.stay.as_mut())],
+    },
+    plain(
+        "until",
+        Name,
+        Some("none"),
+        "the name of another barrier: released once that has been reached, as a door once the key is there",
+    ),
+    plain(
+        "choice",
+        Name,
+        Some("none"),
+        "a name that several barriers give: one of them is promised, which the first step decides, and the others are released. Needs plans",
+    ),
+    plain(
+        "alternative",
+        Name,
+        Some("none: it is one by itself"),
+        "barriers of a `choice` that give the same name here are promised together",
+    ),
     Row {
         key: Key {
             name: "centre",

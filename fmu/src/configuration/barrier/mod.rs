@@ -5,6 +5,7 @@
 //! the FMU.
 
 mod keys;
+mod mission;
 mod raw;
 mod reader;
 mod shape;
@@ -12,6 +13,7 @@ mod shape;
 pub use shape::{Point, SHAPES, Shape, ShapeRow};
 
 pub(super) use keys::SECTION;
+pub(super) use mission::of_mission;
 pub(super) use raw::RawBarrier;
 
 use punctual_core::convergence::operator::Operator;
@@ -154,6 +156,18 @@ pub struct BarrierSection {
     /// Whether it is released when it has been reached.
     #[serde(skip_serializing_if = "is_default")]
     pub until_arrival: bool,
+    /// Time in s for which it is kept before it is released; none: no such end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stay: Option<f64>,
+    /// The barrier whose arrival releases it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub until: Option<String>,
+    /// The choice of which it is an alternative, or a part of one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub choice: Option<String>,
+    /// The alternative of which it is a part.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub alternative: Option<String>,
 }
 
 /// The margin of a set on `plant` where the file has none. What is out of range is refused under its own name.
@@ -197,6 +211,10 @@ impl BarrierSection {
             after: raw.after,
             end: given(raw.end),
             until_arrival: raw.until_arrival,
+            stay: given(raw.stay),
+            until: raw.until,
+            choice: raw.choice,
+            alternative: raw.alternative,
         })
     }
 

@@ -6,7 +6,7 @@ use super::reader::Kind;
 use super::{InfeasibleName, MethodName, ProfileName};
 
 /// The keys of a `[[barrier]]`; [`KEYS`](super::keys::KEYS) has their meanings.
-#[derive(Deserialize)]
+#[derive(Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(in super::super) struct RawBarrier {
     pub(super) name: String,
@@ -58,9 +58,29 @@ pub(in super::super) struct RawBarrier {
     pub(super) end: f64,
     #[serde(default)]
     pub(super) until_arrival: bool,
+    #[serde(default)]
+    pub(super) stay: f64,
+    pub(super) until: Option<String>,
+    pub(super) choice: Option<String>,
+    pub(super) alternative: Option<String>,
 }
 
 impl RawBarrier {
+    /// The keys that say when, and whether they are given.
+    pub(super) fn of_time(&self) -> [(&'static str, bool); 9] {
+        [
+            ("deadline", self.deadline.is_some()),
+            ("begin", self.begin != 0.0),
+            ("after", self.after.is_some()),
+            ("end", self.end != 0.0),
+            ("until_arrival", self.until_arrival),
+            ("stay", self.stay != 0.0),
+            ("until", self.until.is_some()),
+            ("choice", self.choice.is_some()),
+            ("alternative", self.alternative.is_some()),
+        ]
+    }
+
     /// The keys that only some shapes have, and whether they are given; looked at in this order.
     pub(super) fn of_shape(&self) -> [(&'static str, bool); 18] {
         [

@@ -15,6 +15,17 @@ use super::shape::{NAMES, Point, SHAPES, Shape, ShapeRow};
 #[derive(Clone, Copy)]
 pub(super) struct Kind(&'static ShapeRow);
 
+impl Kind {
+    /// The shape of this name.
+    pub(super) fn named(name: &str) -> Option<Self> {
+        SHAPES.iter().find(|row| row.name == name).map(Self)
+    }
+
+    pub(super) fn name(self) -> &'static str {
+        self.0.name
+    }
+}
+
 impl<'de> Deserialize<'de> for Kind {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct Word;
@@ -25,9 +36,8 @@ impl<'de> Deserialize<'de> for Kind {
             }
             fn visit_enum<A: EnumAccess<'de>>(self, data: A) -> Result<Kind, A::Error> {
                 let (name, nothing) = data.variant::<String>()?;
-                let row = SHAPES.iter().find(|row| row.name == name);
                 nothing.unit_variant()?;
-                row.map(Kind).ok_or_else(|| serde::de::Error::unknown_variant(&name, &NAMES))
+                Kind::named(&name).ok_or_else(|| serde::de::Error::unknown_variant(&name, &NAMES))
             }
         }
         deserializer.deserialize_enum("ShapeName", &NAMES, Word)
