@@ -1,7 +1,7 @@
 //! Plans beside points that are measured: however they move within what was declared, what is promised is kept.
 //!
 //! The judge moves plant and points by itself, in closed form or by an integrator of its own, and looks between samples too.
-//! More cases: `PUNCTUAL_MOVING=100 cargo test --release -p punctual-core --test moving -- --nocapture`.
+//! More cases: `PUNCTUAL_MOVING=100 cargo test --release -p punctual-core --test all -- --nocapture moving::`.
 
 #![allow(clippy::print_stdout, reason = "the figures are wanted")]
 

@@ -1,7 +1,7 @@
 //! Attacks on plans beside measured points: clocks, restarts, missing measurements and windows, against points that do their
 //! worst. What a flag covers is judged in closed form for every course of the points, and so is the time until which it holds.
 //!
-//! More cases: `PUNCTUAL_MOVING=100 cargo test --release -p punctual-core --test moving_attack -- --nocapture`.
+//! More cases: `PUNCTUAL_MOVING=100 cargo test --release -p punctual-core --test all -- --nocapture moving_attack::`.
 
 #![allow(clippy::print_stdout, reason = "the figures are wanted")]
 

@@ -2,7 +2,7 @@
 //!
 //! The judge has an integrator of its own. Its plants receive disturbances, errors and gains at their limits: drawn, kept at
 //! corners, or chosen against the law of the plan at hand. Every promise is judged between samples too. More cases:
-//! `PUNCTUAL_ROBUST=100 cargo test --release -p punctual-core --test robust -- --nocapture`.
+//! `PUNCTUAL_ROBUST=100 cargo test --release -p punctual-core --test all -- --nocapture robust::`.
 
 #![allow(clippy::print_stdout, reason = "the figures are wanted")]
 

@@ -330,7 +330,7 @@ impl Decision<'_> {
         let mut inside = [0.0; MAX_INPUTS];
         inside[..u.len()].copy_from_slice(u);
         let is_open = |(i, promise): (usize, &Option<Promise>)| {
-            let is_early = promise.is_some_and(|promise| promise.from > t);
+            let is_early = promise.is_some_and(|promise| promise.from > self.measured.0);
             let next = &self.rows.workspace.next.barriers[i];
             if !is_early || next.since.is_none() {
                 return None;
