@@ -51,11 +51,11 @@ fn stepped(fmu: &Fmu) -> Slave<'_> {
 #[test]
 fn the_layout_is_what_is_documented() {
     assert_eq!(crc32(b"123456789"), 0xcbf4_3926, "the check value of CRC-32");
-    for (configuration, size) in [(FILTER, 979), (PLANT, 202)] {
+    for (configuration, size) in [(FILTER, 988), (PLANT, 202)] {
         let fmu = Fmu::new(configuration);
         let bytes = stepped(&fmu).now();
         assert_eq!(&bytes[..VERSION], b"PUNCTUAL");
-        assert_eq!(bytes[VERSION..GUID], 13_u32.to_le_bytes());
+        assert_eq!(bytes[VERSION..GUID], 14_u32.to_le_bytes());
         assert_eq!(&bytes[GUID..LENGTH], fmu.guid().as_bytes());
         assert_eq!(bytes[LENGTH..MODE], (bytes.len() as u64).to_le_bytes());
         assert_eq!(bytes[MODE], 2, "step mode");
@@ -102,7 +102,7 @@ fn the_message_says_what_is_wrong() {
     for (bytes, wanted) in [
         (Vec::new(), "the state is cut off in the magic number: 0 bytes of 8".to_owned()),
         (with(&bytes, 0, b"p"), "the bytes do not begin as a state does, with \"PUNCTUAL\"".to_owned()),
-        (forged(VERSION, &[1]), "the version of the layout is 1, must be 13".to_owned()),
+        (forged(VERSION, &[1]), "the version of the layout is 1, must be 14".to_owned()),
         (
             other.now(),
             format!(

@@ -131,6 +131,8 @@ fn plans_are_followed_where_that_is_possible() {
     assert_eq!(line(&filter("off", 8.0, "")), "plans: none, since assurance is \"off\"");
     let unbounded = left("").replace(", omega = [-2.0, 2.0]", "");
     assert_eq!(line(&unbounded), "plans: none, since omega has no bounds");
+    let later = left("").replace("name = \"tree\"", "name = \"tree\"\nbegin = 1.0\ndeadline = 9.0");
+    assert_eq!(line(&later), followed);
     for delay in ["0.01", "0.1", "0.13"] {
         assert_eq!(line(&left(&format!("actuation_delay = {delay}"))), followed);
     }
@@ -257,16 +259,15 @@ fn starts_that_can_be_promised_are_drawn() {
 }
 
 /// The content of a file, and the keys that the warning must name because plans do not support them.
-const DECLARED: [(&str, &str, &[&str]); 6] = [
+const DECLARED: [(&str, &str, &[&str]); 5] = [
     ("", "disturbance = 0.2", &["tree.disturbance is 0.2, "]),
-    ("", "begin = 1.0\ndeadline = 9.0", &["tree.begin is 1, "]),
-    ("", "after = \"goal\"", &["tree.after is \"goal\", "]),
+    ("", "after = \"goal\"", &["tree begins with the arrival of goal, whose time is open", "`deadline`"]),
     ("", "centre_input = true", &["tree follows a centre that is moved from outside, "]),
     ("", "velocity = [1.0, 0.0]", &["goal moves with time, ", "(`plan_horizon`)"]),
     (
         "measurement_errors = { v = 0.1 }",
-        "disturbance = 0.1\nbegin = 2.0\ndeadline = 9.0",
-        &["tree.disturbance is 0.1, ", "tree.begin is 2, "],
+        "disturbance = 0.1\nafter = \"goal\"",
+        &["tree.disturbance is 0.1, ", "tree begins with the arrival of goal, whose time is open"],
     ),
 ];
 
