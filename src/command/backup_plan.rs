@@ -135,7 +135,7 @@ pub(super) fn find(
     let deadlines = |factor: f64| {
         let given = c.barrier.iter().enumerate().filter_map(|(i, b)| {
             let arrival = run.and_then(|run| run.arrival(i, t)).unwrap_or(f64::INFINITY);
-            Some((b.name.clone(), (factor * b.deadline?).min(arrival)))
+            Some((b.name.clone(), b.deadline_times(factor)?.min(arrival)))
         });
         given.collect::<Vec<_>>()
     };
@@ -172,7 +172,7 @@ pub(super) fn in_time(c: &FilterConfiguration, x0: &[f64]) -> Result<Vec<String>
     };
     let line = match planning.later_deadline(t, x0, Plans::LONGEST) {
         Some((factor, _)) => {
-            let earliest = c.barrier.iter().filter_map(|b| Some((&b.name, factor * b.deadline?)));
+            let earliest = c.barrier.iter().filter_map(|b| Some((&b.name, b.deadline_times(factor)?)));
             let named: Vec<_> = earliest.map(|(name, at)| format!("{name} {} s", number(at))).collect();
             format!("earliest deadline with a plan: {}", named.join(", "))
         }

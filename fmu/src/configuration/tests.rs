@@ -286,12 +286,15 @@ defects! {
         "barrier[1].choice: only plans can choose, and none are followed: assurance is \"off\". Change that, or leave the choice out";
     a_mission_of_a_place_that_is_nowhere: MISSION, "G !C" => "G !D",
         "mission: has D, which is no barrier, must be one of A, C, rest";
+    a_mission_that_forgets_a_place: MISSION, "F[0,5] A & G !C" => "G !C",
+        "barrier[0].name: is \"A\", which the mission does not name, so that it had to be kept at all times: name it (`G A`), give it \
+         times of its own, or leave it out";
     a_mission_beside_times: MISSION, "centre = [1.0, 2.0]" => "centre = [1.0, 2.0]\ndeadline = 3.0",
         "barrier[0].deadline: stands beside a mission that says when: leave it out, or A out of the mission";
     a_mission_to_be_in_two_places: MISSION, "G !C" => "F[0,4] (A & !C)",
         "mission: has a visit of A & !C at the same time, must be of one: give a barrier that is all of them, such as an \
          `expression` with min";
-    a_mission_outside_of_a_limit: MISSION, "G !C" => "G !rest",
+    a_mission_outside_of_a_limit: MISSION, "G !C" => "G !C & G !rest",
         "mission: has !rest, a speed_limit, of which there is no outside: give a barrier that is it";
     a_visit_that_waits_too_long: MISSION, "F[0,5] A" => "F[0,5] (A & F[2,3] C)",
         "mission: has a visit 2 to 3 s after that of A, which may be 0 to 5 s from the start: that leaves no time that suits all \

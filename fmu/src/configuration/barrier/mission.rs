@@ -12,6 +12,8 @@ const OUTSIDE: [(&str, &str); 4] = [
     ("ellipse", "elliptic_obstacle"),
     ("at_most", "at_least"),
 ];
+/// Shapes of places, where nobody is at all times by accident.
+const PLACES: [&str; 4] = ["disc", "quadratic_disc", "ellipse", "rectangle"];
 /// By how much a time is later that has to be after another, as a part of it.
 const LATER: f64 = 1e-9;
 
@@ -20,7 +22,8 @@ const LATER: f64 = 1e-9;
 ///
 /// # Errors
 ///
-/// A text that is no mission; a name without a table; a table with times of its own; what barriers do not express.
+/// A text that is no mission; a name without a table; a table with times of its own, or a place that has none and is not named;
+/// what barriers do not express.
 pub(in super::super) fn of_mission(
     text: &str,
     tables: Vec<RawBarrier>,
@@ -38,6 +41,17 @@ pub(in super::super) fn of_mission(
                 "stands beside a mission that says when: leave it out, or {region} out of the mission"
             );
             return Err(ConfigurationError::new(format!("barrier[{i}].{key}"), message));
+        }
+    }
+    for (i, table) in tables.iter().enumerate().filter(|(_, table)| !regions.contains(&table.name.as_str())) {
+        let has_times = table.of_time().iter().any(|(_, is_given)| *is_given);
+        if PLACES.contains(&shape(table)) && !has_times {
+            let name = &table.name;
+            let message = format!(
+                "is {name:?}, which the mission does not name, so that it had to be kept at all times: name it (`G {name}`), give it \
+                 times of its own, or leave it out"
+            );
+            return Err(ConfigurationError::new(format!("barrier[{i}].name"), message));
         }
     }
     let mut lowering =
@@ -164,13 +178,17 @@ impl Lowering<'_> {
     }
 }
 
-/// Turns a barrier into that of what is outside of it.
-fn outside(barrier: &mut RawBarrier) -> Result<(), ConfigurationError> {
-    let name = match barrier.shape {
+fn shape(barrier: &RawBarrier) -> &'static str {
+    match barrier.shape {
         Some(kind) => kind.name(),
         None if barrier.expression.is_some() => "expression",
         None => "disc",
-    };
+    }
+}
+
+/// Turns a barrier into that of what is outside of it.
+fn outside(barrier: &mut RawBarrier) -> Result<(), ConfigurationError> {
+    let name = shape(barrier);
     let other = OUTSIDE.iter().find_map(|&(inside, outside)| match name {
         _ if name == inside => Some(outside),
         _ if name == outside => Some(inside),

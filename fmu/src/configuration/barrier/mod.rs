@@ -218,6 +218,11 @@ impl BarrierSection {
         })
     }
 
+    /// Its deadline in s, `factor` times as long, but not before it begins.
+    pub fn deadline_times(&self, factor: f64) -> Option<f64> {
+        self.deadline.map(|deadline| (factor * deadline).max(self.begin.unwrap_or(0.0)))
+    }
+
     /// The unit of h.
     pub fn unit(&self, plant: &PlantSection) -> String {
         self.shape.unit(plant)
