@@ -1,8 +1,6 @@
 //! A filter that is armed later than at its first sample: until then nothing is asked, and from then on it is, bit for bit, a
 //! filter whose first sample came then.
 
-mod scenario;
-
 use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::filter::{
     AssuranceStatus, BarrierSettings, Filter, FilterBuilder, FilterState, Phase, Report, SampleDerivative,

@@ -2,7 +2,7 @@
 //!
 //! The reference values are in `roots/values.csv`; `roots/generate.py` wrote them.
 
-mod draw;
+use crate::draw;
 
 use draw::Draw;
 use proptest::prelude::*;

@@ -1,6 +1,6 @@
 //! The relative degree that is found, and the ones that the builder refuses.
 
-mod support;
+use crate::support;
 
 use std::sync::Arc;
 

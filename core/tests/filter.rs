@@ -1,6 +1,6 @@
 //! The filter as a whole: phases, anchoring, promises along runs, snapshots, statuses.
 
-mod scenario;
+use crate::scenario;
 
 use std::sync::Arc;
 

@@ -3,7 +3,7 @@
 
 #![allow(clippy::print_stdout, reason = "the cases are read from the output")]
 
-mod quadratic;
+use crate::quadratic;
 
 use punctual_core::barriers::HalfPlane;
 use punctual_core::filter::{BarrierSettings, Filter, FilterBuilder, Sampling, Status, Strictness};

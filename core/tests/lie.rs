@@ -2,7 +2,7 @@
 //!
 //! The reference values are in `cas/values.csv`; `cas/generate.py` wrote them.
 
-mod support;
+use crate::support;
 
 use std::sync::Arc;
 

@@ -1,6 +1,6 @@
 //! Filters that allow for errors of the measured state.
 
-mod support;
+use crate::support;
 
 use std::sync::Arc;
 

@@ -2,7 +2,7 @@
 
 #![expect(clippy::print_stdout, reason = "the figures of tests/nightly")]
 
-mod scenario;
+use crate::scenario;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

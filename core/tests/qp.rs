@@ -1,7 +1,7 @@
 //! The quadratic program with one row: known answers, enumeration of active sets, extreme data.
 //! Several rows: `qp_several_rows.rs`.
 
-mod quadratic;
+use crate::quadratic;
 
 use proptest::prelude::*;
 use punctual_core::qp::{Bounds, Outcome, Row, Solver, solve};

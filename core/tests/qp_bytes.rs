@@ -4,7 +4,7 @@
 
 #![allow(clippy::print_stdout, reason = "the figures are read from the output")]
 
-mod quadratic;
+use crate::quadratic;
 
 use punctual_core::qp::{Bounds, Enforcement, Outcome, Problem, Row, Workspace};
 use punctual_core::{MAX_INPUTS, MAX_ROWS};

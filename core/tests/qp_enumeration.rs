@@ -3,8 +3,8 @@
 
 #![allow(clippy::print_stdout, reason = "the figures are read from the output")]
 
-mod enumeration;
-mod quadratic;
+use crate::enumeration;
+use crate::quadratic;
 
 use enumeration::{Found, Point, constraints, least_violation, minimiser, softened};
 use punctual_core::qp::{Bounds, Enforcement, Outcome, Problem, Row, Workspace};

@@ -1,8 +1,8 @@
 //! The quadratic program with several rows: against exact enumeration, its properties, known answers.
 
-mod enumeration;
-mod interior_point;
-mod quadratic;
+use crate::enumeration;
+use crate::interior_point;
+use crate::quadratic;
 
 use nalgebra::DVector;
 use proptest::prelude::*;

@@ -1,7 +1,7 @@
 //! The limits of bounded inputs, against known answers and against runs. Deadlines that are given up. Profiles of
 //! least peak.
 
-mod draw;
+use crate::draw;
 
 use std::sync::Arc;
 

@@ -1,7 +1,7 @@
 //! Promises after an arrival and at the edges of a deadline: leaving, recovering, a deadline that is past or
 //! shorter than a step, an input that acts late.
 
-mod scenario;
+use crate::scenario;
 
 use std::sync::Arc;
 

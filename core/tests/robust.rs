@@ -6,7 +6,7 @@
 
 #![allow(clippy::print_stdout, reason = "the figures are wanted")]
 
-mod uncertain;
+use crate::uncertain;
 
 use punctual_core::barriers::{DistanceDisc, Outside};
 use punctual_core::dynamics::ControlAffine;

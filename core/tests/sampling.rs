@@ -1,7 +1,7 @@
 //! Held inputs: predictions along the flow, the sampled form of the constraint, and its effect.
 
-mod scenario;
-mod support;
+use crate::scenario;
+use crate::support;
 
 use std::sync::Arc;
 

@@ -1,6 +1,6 @@
 //! States, reports and settings as JSON, and back.
 
-mod scenario;
+use crate::scenario;
 
 use proptest::prelude::*;
 use punctual_core::convergence::operator::Operator;

@@ -1,6 +1,6 @@
 //! Misuse: a valid filter first, then one defect at a time, and the message it gives.
 
-mod scenario;
+use crate::scenario;
 
 use std::sync::Arc;
 

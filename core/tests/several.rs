@@ -1,7 +1,5 @@
 //! Several barriers: one after the other, side by side, and in each other's way.
 
-mod scenario;
-
 use punctual_core::barriers::{DistanceDisc, HalfPlane, NormBound, Outside, StateBound};
 use punctual_core::dynamics::rk4_step;
 use punctual_core::filter::{BarrierSettings, Begin, End, Filter, FilterBuilder, Phase, Status};

@@ -2,8 +2,8 @@
 
 #![expect(clippy::float_cmp, reason = "the numbers have to be the same to the bit")]
 
-mod draw;
-mod support;
+use crate::draw;
+use crate::support;
 
 use std::sync::Arc;
 
