@@ -232,9 +232,11 @@ impl Planning<'_> {
         }
         if let Err(Failure::Broken { .. } | Failure::Unsteady | Failure::Spreads) = found
             && self.plans.horizon.is_none()
+            && self.visits(&promises) == 0
             && !self.is_ruled_out(&promises, at.0, x)
         {
-            // A plan that keeps an earlier deadline keeps a later one, though another search may find it.
+            // A plan that keeps an earlier deadline keeps a later one, though another search may find it. One that makes a visit
+            // earlier does not make it later.
             // One that ends before the deadlines themselves does not keep them.
             let reaches = |plan: &Plan| promises.iter().flatten().all(|p| p.from < plan.backup_plan.until);
             let mut earlier = shorter
