@@ -56,6 +56,7 @@ pub enum End {
 
 impl End {
     /// How long in s a visit lasts that ends the promise, if one does; its time is open.
+    #[cfg(feature = "plan")]
     pub(crate) fn visit(self) -> Option<f64> {
         match self {
             Self::OnArrival => Some(0.0),
