@@ -31,10 +31,6 @@ pub trait Barrier<const NX: usize> {
     /// with n > 1 a step does not look for it. With the default, `false`, it does.
     const ONE_SIDED_CURVATURE: bool = false;
 
-    /// The most by which h changes per metre by which its place is moved, such as the centre of a disc; `None`, the default,
-    /// where that has no bound. A set can then not follow a point that is [known inexactly](crate::filter::Plans::motion).
-    const STEEPNESS: Option<f64> = None;
-
     /// h at time `t` (in seconds, on the filter's time axis) and state `x`.
     fn value<S: Scalar>(&self, t: S, x: &[S; NX]) -> S;
 
@@ -42,6 +38,12 @@ pub trait Barrier<const NX: usize> {
     /// first two states, is in `region`, whatever the other states are. `None`, the default, where that is
     /// not known.
     fn highest(&self, _time: [f64; 2], _region: &Region) -> Option<f64> {
+        None
+    }
+
+    /// The most by which h changes per metre by which its place is moved, such as the centre of a disc; `None`, the default,
+    /// where that has no bound. A set can then not follow a point that is [known inexactly](crate::filter::Plans::motion).
+    fn steepness(&self) -> Option<f64> {
         None
     }
 

@@ -434,7 +434,7 @@ where
     }
 
     fn steepness(&self) -> Option<f64> {
-        B::STEEPNESS
+        self.barrier.steepness()
     }
 
     fn value(&self, t: f64, x: &[f64], point: &[f64; 4]) -> f64 {

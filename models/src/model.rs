@@ -247,7 +247,7 @@ struct Listed {
     derivatives: Vec<Register>,
     /// Operations needed at the last order, which only the barrier requires.
     last: Vec<Step>,
-    h: Register,
+    h: Option<Register>,
 }
 
 impl Model {
@@ -262,7 +262,7 @@ impl Model {
             steps: needed(steps, &wanted, *registers),
             derivatives: self.derivatives.clone(),
             last: needed(steps, h.as_slice(), *registers),
-            h: h.unwrap_or_default(),
+            h,
         }
     }
 }
@@ -290,6 +290,34 @@ impl Equations for Listed {
 
     fn finish<C: Scalar>(&mut self, series: &mut Series<C>, n: usize) -> Register {
         series.advance(&self.last, n);
-        self.h
+        self.h.unwrap_or_default()
+    }
+
+    fn of_motion(&self) -> Self {
+        let steps = needed(&self.steps, &self.derivatives, self.registers);
+        Self { steps, last: Vec::new(), ..self.clone() }
+    }
+
+    fn of_value(&self) -> Self {
+        Self { steps: self.last.clone(), ..self.clone() }
+    }
+
+    fn of_barrier(&self) -> Self {
+        let mut wanted: Vec<Register> = self.h.into_iter().collect();
+        let mut moving = vec![false; self.states];
+        loop {
+            let steps = needed(&self.steps, &wanted, self.registers);
+            let read = steps.iter().flat_map(|step| step.operation.reads()).flatten();
+            let read: Vec<Register> = read.chain(wanted.iter().copied()).filter(|r| *r < self.states).collect();
+            let count = wanted.len();
+            for state in read {
+                if !std::mem::replace(&mut moving[state], true) {
+                    wanted.push(self.derivatives[state]);
+                }
+            }
+            if wanted.len() == count {
+                return Self { steps, ..self.clone() };
+            }
+        }
     }
 }

@@ -46,6 +46,22 @@ pub(crate) trait Equations: Clone + Send + 'static {
         [true; 2]
     }
 
+    /// The same with the operations alone that the motion of the states takes.
+    fn of_motion(&self) -> Self {
+        self.clone()
+    }
+
+    /// The same barrier with the operations alone that its value takes, where all states are given.
+    fn of_value(&self) -> Self {
+        self.clone()
+    }
+
+    /// The same barrier with the operations alone that its derivatives take: of the states that ever move h. The derivatives of the
+    /// others are 0.
+    fn of_barrier(&self) -> Self {
+        self.clone()
+    }
+
     /// Computes the coefficients of the barrier up to `n`, after those of the states, and returns their
     /// register.
     fn finish<C: Scalar>(&mut self, series: &mut Series<C>, n: usize) -> Register;
@@ -109,16 +125,19 @@ pub(crate) fn source<E: Equations>(
         n: usize,
         identity: &Identity,
     ) -> Box<dyn DerivativeSource> {
+        let (of_motion, of_barrier, of_value) = (along.of_motion(), along.of_barrier(), along.of_value());
         let work = Work::<E, M> {
-            along: Along::new(plant, along, n),
+            along: Along::new(plant, &of_barrier, n),
             flow: Flow::new(plant),
-            along_tangent: Along::new(plant, along, n),
+            along_tangent: Along::new(plant, &of_barrier, n),
             flow_tangent: Flow::new(plant),
-            expansions: Along::new(plant, along, EXPANSION_ORDERS - 1),
-            value: Along::new(plant, along, 1),
-            few_over: Along::new(plant, along, 1),
-            expansions_over: Along::new(plant, along, EXPANSION_ORDERS - 1),
-            second: Along::new(plant, along, 1),
+            path: Along::new(plant, &of_motion, EXPANSION_ORDERS - 1),
+            expansions: Along::new(plant, &of_value, EXPANSION_ORDERS - 1),
+            value: Along::new(plant, &of_value, 1),
+            few_over: Along::new(plant, &of_value, 1),
+            path_over: Along::new(plant, &of_motion, EXPANSION_ORDERS - 1),
+            expansions_over: Along::new(plant, &of_value, EXPANSION_ORDERS - 1),
+            second: Along::new(plant, &of_value, 1),
             held: vec![[Interval::ALL; 2]; plant.states()],
             rate: vec![0.0; plant.states()],
         };
@@ -371,10 +390,13 @@ struct Work<E, const M: usize> {
     flow: Flow<E, f64>,
     along_tangent: Along<E, Tangent<Dual<M>>>,
     flow_tangent: Flow<E, Tangent<f64>>,
+    /// For the motion of the states, and of h along it.
+    path: Along<E, f64>,
     expansions: Along<E, f64>,
     value: Along<E, f64>,
     /// For enclosures of h, and of h with its rate.
     few_over: Along<E, Interval>,
+    path_over: Along<E, Interval>,
     expansions_over: Along<E, Interval>,
     second: Along<E, Second>,
     /// Enclosures of the states and their rates while an input is held, and the rates at its start.
@@ -496,18 +518,18 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
 
     fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]) {
         let (own, others) = out.split_at_mut(self.states);
-        rates_at(&mut self.work.borrow_mut().expansions.flow, &x[..self.states], u, own);
+        rates_at(&mut self.work.borrow_mut().value.flow, &x[..self.states], u, own);
         others.fill(0.0);
     }
 
     fn path(&self, x: &[f64], u: &[f64], out: &mut [Expansion]) {
-        let expansions = &mut self.work.borrow_mut().expansions;
-        expansions.flow.set_state(x[..self.states].iter().copied());
-        expansions.flow.hold(u.iter().copied());
-        expansions.continue_from_flow(0.0);
+        let path = &mut self.work.borrow_mut().path;
+        path.flow.set_state(x[..self.states].iter().copied());
+        path.flow.hold(u.iter().copied());
+        path.continue_from_flow(0.0);
         let (own, others) = out.split_at_mut(self.states);
         for (i, out) in own.iter_mut().enumerate() {
-            *out = std::array::from_fn(|k| expansions.series.get(i, k));
+            *out = std::array::from_fn(|k| path.series.get(i, k));
         }
         for (out, x) in others.iter_mut().zip(&x[self.states..]) {
             *out = [0.0; EXPANSION_ORDERS];
@@ -527,7 +549,7 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
     }
 
     fn rates_over(&self, path: &[ExpansionOver], u: &[f64], orders: usize, out: &mut [RateOver]) -> bool {
-        let Along { equations, series, .. } = &mut self.work.borrow_mut().expansions_over;
+        let Along { equations, series, .. } = &mut self.work.borrow_mut().path_over;
         let (path, (out, others)) = (&path[..self.states], out.split_at_mut(self.states));
         others.fill([Interval::from(0.0); EXPANSION_ORDERS - 1]);
         for (register, &value) in (path.len()..).zip(u) {
@@ -584,7 +606,7 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
         let Work { value, few_over, held, rate, .. } = &mut *self.work.borrow_mut();
         let x = &x[..self.states];
         rates_at(&mut value.flow, x, u, rate);
-        let Along { equations, series, .. } = few_over;
+        let Flow { equations, series, .. } = &mut few_over.flow;
         for (register, &value) in (x.len()..).zip(u) {
             series.set(register, 0, Interval::from(value));
         }

@@ -85,6 +85,22 @@ pub fn usual(system: &System, models: &[Model], outcome: &Outcome) -> Vec<Drawin
     pictures
 }
 
+/// The name of a state that is a heading, in rad from the x axis.
+const HEADING: &str = "theta";
+
+/// The signals of a position in a plane.
+#[derive(Clone)]
+pub struct Position {
+    /// The name of what moves.
+    pub label: String,
+    /// Along x and y.
+    pub place: [String; 2],
+    /// Along z, if there is such a state.
+    pub height: Option<String>,
+    /// Its heading, which may not be recorded.
+    pub heading: String,
+}
+
 /// A component and its model.
 pub struct Part<'a> {
     /// Its entry in the system file.
@@ -181,21 +197,34 @@ impl Part<'_> {
             .map(|side| self.number(&format!("{side}.{input}")).filter(|limit| limit.abs() < UNBOUNDED))
     }
 
-    /// Its positions in a plane, as pairs of signals with a name each. There are several if it moves several
-    /// things.
-    pub fn places(&self) -> Vec<(String, [String; 2])> {
+    /// Its positions in a plane. There are several if it moves several things.
+    pub fn places(&self) -> Vec<Position> {
         let variables = &self.model.description().variables;
         let outputs = variables.iter().filter(|v| v.causality == Causality::Output);
         let states: Vec<_> =
             outputs.filter_map(|v| Some((v.name.strip_prefix("x.")?, v.unit.as_deref()))).collect();
         let planes = planes(&states);
         let component = &self.component.name;
-        let label = |x: &str| if planes.len() == 1 { component.clone() } else { format!("{component} {x}") };
+        let label = |x: &str| match mover(x) {
+            _ if planes.len() == 1 => component.clone(),
+            Some(mover) => mover.to_owned(),
+            None => format!("{component} {x}"),
+        };
         let signal = |axis: &str| self.signal(&format!("x.{axis}"));
-        planes
-            .iter()
-            .map(|&[x, y]| (label(states[x].0), [signal(states[x].0), signal(states[y].0)]))
-            .collect()
+        let position = |&[x, y]: &[usize; 2]| {
+            let [x, y] = [states[x].0, states[y].0];
+            let heading = mover(x).map_or_else(|| HEADING.to_owned(), |mover| format!("{mover}_{HEADING}"));
+            // In space: the third axis, where the second is no height.
+            let height =
+                along(x, "z").into_iter().find(|z| z != y && states.iter().any(|(state, _)| state == z));
+            Position {
+                label: label(x),
+                place: [signal(x), signal(y)],
+                height: height.as_deref().map(signal),
+                heading: signal(&heading),
+            }
+        };
+        planes.iter().map(position).collect()
     }
 
     /// The outlines of its barriers that are expressions of only the position, if they come near `ranges` of
@@ -268,12 +297,23 @@ impl Part<'_> {
 fn planes(signals: &[(&str, Option<&str>)]) -> Vec<[usize; 2]> {
     let beside = |(x, unit): (&str, Option<&str>)| {
         let named = PLANES.iter().find(|axes| axes[0] == x).map(|axes| axes[1].to_owned());
-        // Such as xa and ya, or x and z: lengths whose names differ only in that letter.
-        let letters = ["y", "z"].map(|letter| x.replacen('x', letter, 1));
-        let lengths = letters.into_iter().filter(|_| x.contains('x') && unit == Some("m"));
+        // Such as xa and ya, or x and z: lengths whose names differ only in that letter, of which one may have several.
+        let letters = ["y", "z"].into_iter().flat_map(|letter| along(x, letter));
+        let lengths = letters.filter(|_| unit == Some("m"));
         named.into_iter().chain(lengths).find_map(|y| signals.iter().position(|other| *other == (&*y, unit)))
     };
     signals.iter().enumerate().filter_map(|(i, x)| Some([i, beside(*x)?])).collect()
+}
+
+/// What the signal `x` may be called along the axis `letter`: each of its letters x may be that of the axis, the last one first.
+fn along(x: &str, letter: &str) -> Vec<String> {
+    let places = x.rmatch_indices('x').map(|(at, _)| format!("{}{letter}{}", &x[..at], &x[at + 1..]));
+    places.collect()
+}
+
+/// The name of what moves, where its position along x has it in front, as `red` in `red_x` and `red_x_p`.
+fn mover(x: &str) -> Option<&str> {
+    ["_x_p", "_p_x", "_px", "_x"].iter().find_map(|end| x.strip_suffix(end)).filter(|name| !name.is_empty())
 }
 
 /// The paths of all components that move in a plane, with the sets of all filters.
@@ -281,7 +321,8 @@ fn plane(parts: &[Part<'_>], recording: &Recording) -> Option<Drawing> {
     let is_recorded = |signal: &String| recording.index_of(signal).is_some();
     let arrival = parts.iter().find_map(|part| Some(part.signal(&format!("{}.arrived", part.goal()?))));
     let arrival = arrival.filter(is_recorded);
-    let paths = parts.iter().flat_map(Part::places).filter(|(_, place)| place.iter().all(is_recorded));
+    let paths = parts.iter().flat_map(Part::places).map(|position| (position.label, position.place));
+    let paths = paths.filter(|(_, place)| place.iter().all(is_recorded));
     let paths: Vec<_> = paths.collect();
     let seen =
         |axis: usize| paths.iter().filter_map(move |(_, place)| recording.series(&place[axis])).flatten();

@@ -51,8 +51,16 @@ impl Outline {
             Shape::RectangularObstacle { .. } => {
                 (round(pair("half_sides")?.map(|side| side * elementary::powf(2.0, 0.25)), 0.5), true)
             }
+            // Of what is in space, as seen from above.
+            Shape::Sphere { .. } => (round([number("radius")?; 2], 1.0), false),
+            Shape::SphericalObstacle { .. } => (round([number("radius")?; 2], 1.0), true),
+            Shape::Box { .. } => (round(pair("half_sides")?, 0.5), false),
+            Shape::BoxObstacle { .. } => {
+                (round(pair("half_sides")?.map(|side| side * elementary::powf(3.0, 0.25)), 0.5), true)
+            }
             Shape::HalfPlane { .. } => (half_plane(pair("normal")?, FAR * size), false),
-            Shape::AtMost { .. }
+            Shape::Apart { .. }
+            | Shape::AtMost { .. }
             | Shape::AtLeast { .. }
             | Shape::SpeedLimit { .. }
             | Shape::Expression { .. }

@@ -16,6 +16,7 @@ mod readme;
 mod reproducers;
 mod sampling;
 mod starts;
+mod teams;
 
 use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{DistanceDisc, QuadraticDisc};

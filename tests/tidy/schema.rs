@@ -53,6 +53,7 @@ fn kind(value: Value) -> String {
     match value {
         Value::Number(unit, range)
         | Value::Pair(unit, range)
+        | Value::Place(unit, range)
         | Value::Numbers(unit, range)
         | Value::Pairs(unit, range)
         | Value::NumberByName(unit, range) => number(unit, range),
@@ -60,6 +61,7 @@ fn kind(value: Value) -> String {
         Value::Count(from, to) if to >= u64::from(u32::MAX) => format!("a whole number ≥ {from}"),
         Value::Count(from, to) => format!("{from} to {to}"),
         Value::Name => "a C identifier".to_owned(),
+        Value::Names => "C identifiers".to_owned(),
         Value::Word(&[only]) => format!("`\"{only}\"`"),
         _ => String::new(),
     }
@@ -147,9 +149,13 @@ fn schema_of_value(value: Value) -> Json {
     let pair = |items: Json| json!({ "type": "array", "items": items, "minItems": 2, "maxItems": 2 });
     let many = |items: Json| json!({ "type": "array", "items": items });
     let by_name = |values: Json| json!({ "type": "object", "additionalProperties": values });
+    let identifier = || json!({ "type": "string", "pattern": "^[A-Za-z_][A-Za-z0-9_]{0,63}$" });
     match value {
         Value::Number(_, range) => number(range),
         Value::Pair(_, range) => pair(number(range)),
+        Value::Place(_, range) => {
+            json!({ "type": "array", "items": number(range), "minItems": 2, "maxItems": 3 })
+        }
         Value::Numbers(_, range) => many(number(range)),
         Value::Pairs(_, range) => many(pair(number(range))),
         Value::NumberByName(_, range) => by_name(number(range)),
@@ -157,7 +163,8 @@ fn schema_of_value(value: Value) -> Json {
         Value::Count(from, to) => json!({ "type": "integer", "minimum": from, "maximum": to }),
         Value::Flag => json!({ "type": "boolean" }),
         Value::Text => json!({ "type": "string" }),
-        Value::Name => json!({ "type": "string", "pattern": "^[A-Za-z_][A-Za-z0-9_]{0,63}$" }),
+        Value::Name => identifier(),
+        Value::Names => many(identifier()),
         Value::Word(words) => json!({ "type": "string", "enum": words }),
         Value::TextByName => by_name(json!({ "type": "string" })),
         Value::TextOrByName => {

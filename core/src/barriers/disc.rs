@@ -171,11 +171,14 @@ impl DistanceDisc {
 
 impl<const NX: usize> Barrier<NX> for DistanceDisc {
     const ONE_SIDED_CURVATURE: bool = true;
-    const STEEPNESS: Option<f64> = Some(1.0);
 
     #[inline(always)]
     fn value<S: Scalar>(&self, t: S, x: &[S; NX]) -> S {
         -(self.centre.distance_squared(t, x) + self.smoothing * self.smoothing).sqrt() + self.level
+    }
+
+    fn steepness(&self) -> Option<f64> {
+        Some(1.0)
     }
 
     fn highest(&self, time: [f64; 2], region: &Region) -> Option<f64> {

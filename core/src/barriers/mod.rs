@@ -32,11 +32,14 @@ pub struct Outside<B>(pub B);
 
 impl<B: Barrier<NX>, const NX: usize> Barrier<NX> for Outside<B> {
     const ONE_SIDED_CURVATURE: bool = B::ONE_SIDED_CURVATURE;
-    const STEEPNESS: Option<f64> = B::STEEPNESS;
 
     #[inline(always)]
     fn value<S: Scalar>(&self, t: S, x: &[S; NX]) -> S {
         -self.0.value(t, x)
+    }
+
+    fn steepness(&self) -> Option<f64> {
+        self.0.steepness()
     }
 
     fn range_from(&self, t: f64, x: &[f64; NX]) -> Option<[f64; 2]> {

@@ -4,7 +4,6 @@ use std::cell::OnceCell;
 use std::sync::Arc;
 
 use punctual_core::Error;
-use punctual_core::barrier::Barrier;
 use punctual_core::dynamics::{ControlAffine, WithPoint};
 use punctual_core::filter::FilterBuilder;
 use punctual_core::lie::{self, DerivativeSource, RelativeDegree};
@@ -14,6 +13,7 @@ use punctual_core::plants::{
 use punctual_models::Model;
 use punctual_models::evaluated::CodeModel;
 
+use super::barrier::Region;
 use super::parameter::UNBOUNDED;
 use super::{
     BarrierSection, ConfigurationError, FilterConfiguration, ModelName, PlantSection, ReferenceSection,
@@ -121,6 +121,11 @@ impl MixedDegree<'_> {
 }
 
 impl Adding<'_> {
+    /// The states that are the position of the barrier, on a plant of expressions.
+    pub(super) fn own_position(&self) -> Option<&[String]> {
+        Some(&self.section().position[..]).filter(|position| !position.is_empty())
+    }
+
     /// Whether the plant is one of expressions.
     pub(super) fn is_own(&self) -> bool {
         matches!(self.configuration.plant, PlantSection::Expressions(_))
@@ -175,40 +180,37 @@ impl Adding<'_> {
     }
 
     /// Adds a region, which `barrier` makes for a plant with these states, along a reference plant.
-    pub(super) fn along<B>(
+    pub(super) fn along(
         self,
-        barrier: impl FnOnce(&'static [Signal]) -> Result<B, Error>,
-    ) -> Result<FilterBuilder, ConfigurationError>
-    where
-        B: Barrier<4> + Barrier<5> + Barrier<8> + Barrier<9> + Send + 'static,
-    {
+        barrier: impl FnOnce(&'static [Signal]) -> Result<Region, Error>,
+    ) -> Result<FilterBuilder, ConfigurationError> {
         let Some(plant) = self.configuration.plant.reference() else {
             let field = format!("barrier[{}].shape", self.index);
             return Err(ConfigurationError::new(field, "is for the plants that have a name"));
         };
         let barrier = barrier(plant.model.states()).map_err(|e| self.named(e))?;
         match self.plant.reference(plant)?.clone() {
-            Reference::PointMass(plant) => self.along_plant::<_, _, 4, 8>(plant, barrier),
-            Reference::Unicycle(plant) => self.along_plant::<_, _, 4, 8>(plant, barrier),
-            Reference::Bicycle(plant) => self.along_plant::<_, _, 4, 8>(plant, barrier),
-            Reference::SmallSlip(plant) => self.along_plant::<_, _, 4, 8>(plant, barrier),
-            Reference::SmallSlipRate(plant) => self.along_plant::<_, _, 5, 9>(plant, barrier),
-            Reference::Kinematic(plant) => self.along_plant::<_, _, 5, 9>(plant, barrier),
+            Reference::PointMass(plant) => self.along_plant::<_, 4, 8>(plant, barrier),
+            Reference::Unicycle(plant) => self.along_plant::<_, 4, 8>(plant, barrier),
+            Reference::Bicycle(plant) => self.along_plant::<_, 4, 8>(plant, barrier),
+            Reference::SmallSlip(plant) => self.along_plant::<_, 4, 8>(plant, barrier),
+            Reference::SmallSlipRate(plant) => self.along_plant::<_, 5, 9>(plant, barrier),
+            Reference::Kinematic(plant) => self.along_plant::<_, 5, 9>(plant, barrier),
         }
     }
 
     /// Adds it along a plant. `EXTENDED` = `NX` + 4 states where the barrier follows a point.
-    fn along_plant<P, B, const NX: usize, const EXTENDED: usize>(
+    fn along_plant<P, const NX: usize, const EXTENDED: usize>(
         mut self,
         plant: Arc<P>,
-        barrier: B,
+        barrier: Region,
     ) -> Result<FilterBuilder, ConfigurationError>
     where
         P: ControlAffine<NX, 2> + Copy + Send + Sync + 'static,
-        B: Barrier<NX> + Barrier<EXTENDED> + Send + 'static,
     {
         let source = if self.section().shape.followed().is_none() {
-            self.degree(lie::detected(&*plant, &barrier), || None).and_then(|n| lie::along(plant, barrier, n))
+            self.degree(lie::detected::<_, _, NX, 2>(&*plant, &barrier), || None)
+                .and_then(|n| lie::along(plant, barrier, n))
         } else {
             let (beside, first) = (WithPoint::<_, NX>(*plant), self.first);
             self.degree(lie::detected::<_, _, EXTENDED, 2>(&beside, &barrier), || None)

@@ -125,6 +125,9 @@ impl FilterConfiguration {
     /// How two barriers are apart, with that first which lies within what the other keeps out of.
     fn lies(&self, [a, b]: [usize; 2]) -> Option<([&BarrierSection; 2], Apart)> {
         let pair = [self.barrier.get(a)?, self.barrier.get(b)?];
+        if pair[0].position != pair[1].position {
+            return None;
+        }
         let turned = [pair[1], pair[0]];
         [pair, turned].into_iter().find_map(|[p, q]| Some(([p, q], apart(&p.shape, &q.shape)?)))
     }

@@ -19,6 +19,7 @@ use super::key::{
 use super::model::RawModel;
 use super::names::{Named, check_identifier, check_known, is_reserved, taken};
 use super::parameter::UNBOUNDED;
+use super::team::{self, RawAgent};
 use super::words::words;
 use super::{
     BarrierInput, BarrierSection, ConfigurationError, DisturbanceSection, EXPERIMENT, ExperimentSection,
@@ -71,25 +72,28 @@ pub(super) struct RawFilter {
     arm_after: f64,
     #[serde(default = "correction_limit")]
     correction_limit: f64,
-    plant: RawModel,
-    integrator: Option<IntegratorSection>,
-    policy: Option<BTreeMap<String, String>>,
-    barrier: Vec<RawBarrier>,
+    pub(super) plant: RawModel,
+    pub(super) integrator: Option<IntegratorSection>,
+    pub(super) policy: Option<BTreeMap<String, String>>,
+    pub(super) barrier: Vec<RawBarrier>,
     mission: Option<String>,
     #[serde(default)]
-    bounds: BTreeMap<String, [f64; 2]>,
+    pub(super) agent: Vec<RawAgent>,
+    pub(super) keep_apart: Option<f64>,
     #[serde(default)]
-    measurement_errors: BTreeMap<String, f64>,
-    uncertainty: Option<UncertaintySection>,
+    pub(super) bounds: BTreeMap<String, [f64; 2]>,
+    #[serde(default)]
+    pub(super) measurement_errors: BTreeMap<String, f64>,
+    pub(super) uncertainty: Option<UncertaintySection>,
     #[serde(default)]
     experiment: ExperimentSection,
     #[serde(default)]
-    x0: BTreeMap<String, f64>,
-    u_ref: Option<BTreeMap<String, String>>,
-    simulated: Option<RawModel>,
+    pub(super) x0: BTreeMap<String, f64>,
+    pub(super) u_ref: Option<BTreeMap<String, String>>,
+    pub(super) simulated: Option<RawModel>,
     #[serde(default)]
     integration: IntegrationSection,
-    disturbance: Option<DisturbanceSection>,
+    pub(super) disturbance: Option<DisturbanceSection>,
 }
 
 /// A filter FMU. docs/configuration.md has units, ranges and defaults.
@@ -180,7 +184,7 @@ fn correction_limit() -> f64 {
 pub(super) static SECTION: Section = Section {
     name: "filter",
     keys: || {
-        static KEYS: [Key; 25] = [
+        static KEYS: [Key; 27] = [
             Key::new("kind", Word(&["filter"]), None, ""),
             Key::new("name", Name, Some("`filter`"), "the FMU's name"),
             Key::new("plant", Table(&model::PLANT), None, "[the model](#models) that the filter is for"),
@@ -197,6 +201,19 @@ pub(super) static SECTION: Section = Section {
                 Some("none"),
                 "[where to be and when](#missions), in signal temporal logic, such as `F[0,5] A & F[5,12] B & G !C`; the names are those of \
                  barriers, which then say only where that is",
+            ),
+            Key::new(
+                "agent",
+                Tables(&team::SECTION),
+                Some("none"),
+                "[a team](#teams) of vehicles of the one model `plant`: each of these has its states and inputs, called by its name \
+                 and theirs, such as `red_v`",
+            ),
+            Key::new(
+                "keep_apart",
+                Number(Is("m"), Range::POSITIVE),
+                Some("none"),
+                "of a team: the least distance of every two agents, at all times",
             ),
             Key::new(
                 "sampling",
@@ -361,6 +378,7 @@ fn barriers(raw: Vec<RawBarrier>, plant: &PlantSection) -> Result<Vec<BarrierSec
 impl FilterConfiguration {
     /// Completes and checks `raw`.
     pub(super) fn parse(raw: RawFilter, loader: &dyn PluginLoader) -> Result<Self, ConfigurationError> {
+        let raw = raw.joined()?;
         // Name and plant.
         let name = if raw.name.is_empty() { "filter".to_owned() } else { raw.name };
         check_identifier("name", &name)?;
@@ -490,7 +508,9 @@ impl FilterConfiguration {
         let mut h = vec![0.0; self.barrier.len()];
         for (i, section) in self.barrier.iter().enumerate() {
             let Some(centre) = section.shape.inmost() else { continue };
-            x[..2].copy_from_slice(&centre);
+            for (axis, at) in centre.iter().enumerate() {
+                x[self.position_of(section, axis)] = *at;
+            }
             let named = |e: punctual_core::Error| ConfigurationError::new(e.field(), e.message());
             filter.barrier_values(0.0, &x, &mut h).map_err(named)?;
             let margin = section.margin;
@@ -507,6 +527,12 @@ impl FilterConfiguration {
             }
         }
         Ok(())
+    }
+
+    /// The index of the state that is the position of a barrier along an axis.
+    fn position_of(&self, section: &BarrierSection, axis: usize) -> usize {
+        let is = |state: &VariableSection| section.position.get(axis).is_some_and(|name| *name == state.name);
+        self.plant.states().iter().position(is).unwrap_or(axis)
     }
 
     /// The numbers that are parameters of the FMU.

@@ -274,6 +274,16 @@ impl<'de> Deserializer<'de> for Found<'de> {
         }
     }
 
+    /// A list whose entries are counted as those of one with a fixed number, which the visitor knows.
+    fn deserialize_tuple_struct<V: Visitor<'de>>(
+        self,
+        _: &'static str,
+        _: usize,
+        visitor: V,
+    ) -> Result<V::Value, Refusal> {
+        self.list(visitor, true)
+    }
+
     fn deserialize_map<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Refusal> {
         self.table(visitor)
     }
@@ -306,7 +316,7 @@ impl<'de> Deserializer<'de> for Found<'de> {
 
     forward_to_deserialize_any! {
         bool i8 i16 i32 i64 i128 u8 u16 u32 u64 u128 f32 f64 char str string bytes byte_buf unit unit_struct
-        tuple_struct identifier
+        identifier
     }
 }
 

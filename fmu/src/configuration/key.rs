@@ -36,6 +36,8 @@ pub enum Value {
     Number(Unit, Range),
     /// Two numbers, `[1.0, 2.0]`.
     Pair(Unit, Range),
+    /// Numbers along the axes of the plane or of space: two or three.
+    Place(Unit, Range),
     /// Numbers, as many as there are.
     Numbers(Unit, Range),
     /// Pairs of numbers, as many as there are.
@@ -50,6 +52,8 @@ pub enum Value {
     Flag,
     /// Any text.
     Text,
+    /// C identifiers, as many as there are.
+    Names,
     /// A C identifier.
     Name,
     /// One of these texts.

@@ -26,6 +26,7 @@ mod plant;
 mod plugin;
 mod read;
 mod reference;
+mod team;
 mod uncertainty;
 mod unit;
 mod words;
@@ -56,6 +57,7 @@ pub use unit::{base_unit, over_seconds, quantity};
 use serde::{Deserialize, Serialize};
 
 use plugin::NoPlugins;
+use punctual_models::MAX_STATES;
 use unit::{check_unit, unit_per};
 pub(crate) use unit::{multiply, symbol_of};
 
@@ -193,8 +195,9 @@ impl Configuration {
 }
 
 /// The files and their tables, each after the tables that contain it.
-pub static SECTIONS: [&Section; 14] = [
+pub static SECTIONS: [&Section; 15] = [
     &filter::SECTION,
+    &team::SECTION,
     &barrier::SECTION,
     &model::PLANT,
     &model::VARIABLE,

@@ -8,6 +8,7 @@ use punctual_core::scalar::Scalar;
 use punctual_models::{Functions, Model, Unit, unit_of};
 use serde::{Deserialize, Serialize};
 
+use super::adding::not_affine;
 use super::external::check_inputs as check_external_inputs;
 use super::key::{
     Key, Section,
@@ -15,7 +16,7 @@ use super::key::{
     Value::{Name, Number, Tables, Text, TextByName, TextOrByName, Word},
 };
 use super::names::{Named, check_identifier, check_known, is_reserved, taken};
-use super::plugin::{PluginDigest, PluginLoader, PluginSection};
+use super::plugin::{NoPlugins, PluginDigest, PluginLoader, PluginSection};
 use super::reference::{self, RawReference};
 use super::unit::measured;
 use super::{ConfigurationError, ModelName, Parameter, Range, ReferenceSection, check_unit, over_seconds};
@@ -223,6 +224,92 @@ pub(super) static PARAMETER: Section = Section {
         KEYS.iter().collect()
     },
 };
+
+/// A model of expressions as written in a file, or one with a name as that.
+#[derive(Default)]
+pub(super) struct OwnModel {
+    pub(super) states: Vec<VariableSection>,
+    pub(super) inputs: Vec<VariableSection>,
+    pub(super) parameters: Vec<ParameterSection>,
+    pub(super) derivatives: BTreeMap<String, String>,
+    /// The model by name that it is.
+    pub(super) model: Option<ModelName>,
+}
+
+impl OwnModel {
+    /// The states that are its position, by axis: of a model by name the first two, else those with the usual names.
+    pub(super) fn position(&self) -> Option<Vec<String>> {
+        let names: Vec<&str> = self.states.iter().map(|state| state.name.as_str()).collect();
+        match self.model {
+            Some(_) => Some(names[..2].iter().map(ToString::to_string).collect()),
+            None => [3, 2].into_iter().find_map(|axes| usual_position(&names, axes)),
+        }
+    }
+}
+
+/// The names of the states that usually are the position, by axis.
+const USUAL: [[&str; 3]; 3] = [["x", "y", "z"], ["x_p", "y_p", "z_p"], ["p_x", "p_y", "p_z"]];
+
+/// Which of the states `names` are the position along the first `axes` axes, if they have the usual names.
+pub(super) fn usual_position(names: &[&str], axes: usize) -> Option<Vec<String>> {
+    let all = USUAL.iter().map(|usual| &usual[..axes]).find(|all| all.iter().all(|s| names.contains(s)))?;
+    Some(all.iter().map(ToString::to_string).collect())
+}
+
+impl From<OwnModel> for RawModel {
+    fn from(own: OwnModel) -> Self {
+        Self {
+            states: Some(own.states),
+            inputs: Some(own.inputs),
+            parameters: Some(own.parameters),
+            derivatives: Some(own.derivatives),
+            ..Self::default()
+        }
+    }
+}
+
+impl RawModel {
+    /// The model as expressions.
+    ///
+    /// # Errors
+    ///
+    /// A plug-in, inputs alone; a model by name with constants of others, or that no filter can have.
+    pub(super) fn own(self) -> Result<OwnModel, ConfigurationError> {
+        let Some(model) = self.model else {
+            let Self { states: Some(states), inputs: Some(inputs), derivatives: Some(derivatives), .. } =
+                self
+            else {
+                let message = "must be a model by name, or one with `states`, `inputs` and `derivatives`: others cannot be joined for \
+                               `[[agent]]`";
+                return Err(ConfigurationError::new("plant", message));
+            };
+            let parameters = self.parameters.unwrap_or_default();
+            return Ok(OwnModel { states, inputs, parameters, derivatives, model: None });
+        };
+        let PlantSection::Reference(reference) = PlantSection::parse(self, &NoPlugins)? else {
+            return Ok(OwnModel::default());
+        };
+        if !model.is_affine() {
+            return Err(not_affine(model));
+        }
+        let names = model.states().iter().map(|state| state.name.to_owned());
+        let parameter = |(name, start): (&str, f64)| ParameterSection {
+            name: name.to_owned(),
+            start,
+            unit: reference::LENGTH_UNIT.to_owned(),
+            description: String::new(),
+            min: None,
+            max: None,
+        };
+        Ok(OwnModel {
+            states: model.states().iter().map(VariableSection::from).collect(),
+            inputs: model.inputs().iter().map(VariableSection::from).collect(),
+            parameters: reference.constants().map(parameter).collect(),
+            derivatives: names.zip(reference.derivatives().iter().map(ToString::to_string)).collect(),
+            model: Some(model),
+        })
+    }
+}
 
 impl PlantSection {
     /// Completes and checks `raw`.

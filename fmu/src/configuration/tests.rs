@@ -643,7 +643,8 @@ fn every_key_refuses_other_types_in_plain_words() {
                 let fits = match key.value {
                     Value::Number(..) => &["number", "whole"][..],
                     Value::Count(..) => &["whole"],
-                    Value::Pair(..) => &["numbers"],
+                    Value::Pair(..) | Value::Place(..) => &["numbers"],
+                    Value::Names => &["texts", "empty"],
                     Value::Numbers(..) => &["numbers", "empty"],
                     Value::Pairs(..) => &["pairs", "empty"],
                     Value::Flag => &["flag"],

@@ -14,7 +14,7 @@ use serde::Serialize;
 use crate::drawing::{self, Group, Part};
 use crate::page::{Page, escape, json};
 use crate::plot::{self, Chart, Curve, Mark, POINTS, Scaling, Style};
-use scene::{Area, Outline, Strip, Vehicle};
+use scene::{Area, Outline, Solid, Strip, Vehicle};
 
 const SCRIPT: &str = include_str!("run.js");
 const STYLE: &str = include_str!("run.css");
@@ -29,6 +29,8 @@ struct Scene {
     time: [f64; 2],
     vehicles: Vec<Vehicle>,
     outlines: Vec<Outline>,
+    /// The sets in space, if something moves in it.
+    solids: Vec<Solid>,
     /// The status of each filter, with the key of its place in the page.
     strips: Vec<(String, Strip)>,
     /// What lies beneath the curves of a chart, with its key.
@@ -71,6 +73,14 @@ pub fn document(
     let mut drawn = String::new();
     let filters: Vec<&Part<'_>> = parts.iter().filter(|part| !part.barriers().is_empty()).collect();
     if let Some(chart) = plane(&parts, outcome, &mut scene) {
+        let in_space = scene.vehicles.iter().any(|vehicle| !vehicle.z.is_empty());
+        if in_space {
+            scene.solids = parts.iter().flat_map(Solid::all).collect();
+            drawn += "<h2>Space</h2>\n<div class=\"space\"></div>\n\
+                      <p class=\"hint\">Drag to turn. Green: to be inside. Red: to stay out. What has no ends is drawn as far as the \
+                      paths reach.</p>\n";
+        }
+        let title = if in_space { "Path, from above" } else { "Path" };
         let arrival = chart.curves.iter().any(|curve| curve.ends[1].is_some());
         let arrival = if arrival { " Diamond: arrival." } else { "" };
         let around = |(i, tube): (usize, &FirstTube)| Some(Area::new(tube.path.as_ref()?.rings(), i));
@@ -78,7 +88,7 @@ pub fn document(
         let tube = if around_paths.is_empty() { "" } else { SHADED };
         let _ = writeln!(
             drawn,
-            "<h2>Path</h2>\n<div class=\"chart plane\" data-chart=\"path\"></div>\n\
+            "<h2>{title}</h2>\n<div class=\"chart plane\" data-chart=\"path\"></div>\n\
              <p class=\"hint\">Circle: start.{arrival} Green: to be inside. Red: to stay out.{tube}{}</p>",
             match &scene.left_out[..] {
                 [] => String::new(),

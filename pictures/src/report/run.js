@@ -105,6 +105,103 @@
     movers.push((t) => { for (const move of parts) move(t); });
   }
 
+  // Space, as seen from a direction that dragging turns.
+  const holder = document.querySelector(".space");
+  if (holder) {
+    const flyers = scene.vehicles.filter((v) => v.z.length);
+    const reach = [0, 1, 2].map((axis) => {
+      const paths = flyers.flatMap((v) => [v.x, v.y, v.z][axis]).filter(Number.isFinite);
+      const solids = scene.solids.filter((s) => axis < 2 || s.round !== 2);
+      const sides = solids.flatMap((s) => [s.centre[axis] - s.size[axis], s.centre[axis] + s.size[axis]]);
+      const all = [...paths, ...sides, ...(axis === 2 ? [0] : [])];
+      return [all.reduce((a, b) => Math.min(a, b), Infinity), all.reduce((a, b) => Math.max(a, b), -Infinity)];
+    });
+    const middle = reach.map(([low, high]) => (low + high) / 2);
+    const radius = Math.hypot(...reach.map(([low, high]) => (high - low) / 2)) || 1;
+    const W = 720, H = 480, per = H / (2.1 * radius);
+    const svg = make("svg", { viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": "the paths in space" }, holder);
+    let azimuth = -0.9, elevation = 0.5;
+    // On the screen: to the right, down, and how near.
+    const seen = (p) => {
+      const [x, y, z] = p.map((v, i) => v - middle[i]);
+      const [s, c, t, u] = [Math.sin(azimuth), Math.cos(azimuth), Math.sin(elevation), Math.cos(elevation)];
+      const right = -s * x + c * y, back = c * x + s * y;
+      return [W / 2 + per * right, H / 2 - per * (u * z - t * back), u * back + t * z];
+    };
+    const line = (points, closed) => {
+      const all = points.map((p) => seen(p).slice(0, 2).map((v) => v.toFixed(1)).join(" "));
+      return all.length ? `M${all.join("L")}${closed ? "Z" : ""}` : "";
+    };
+    const ring = (f) => Array.from({ length: 49 }, (_, k) => f(Math.cos((2 * Math.PI * k) / 48), Math.sin((2 * Math.PI * k) / 48)));
+    const faces = (s) => {
+      const [a, b] = [Math.cos(s.angle), Math.sin(s.angle)];
+      const at = (i, j, k) => [s.centre[0] + a * i * s.size[0] - b * j * s.size[1], s.centre[1] + b * i * s.size[0] + a * j * s.size[1], s.centre[2] + k * s.size[2]];
+      if (s.round === 3) {
+        const [x, y, z] = s.centre, r = s.size[0], [p, q] = [Math.cos(azimuth), Math.sin(azimuth)], [t, u] = [Math.sin(elevation), Math.cos(elevation)];
+        // Its outline faces the viewer; the equator shows its turn.
+        return [ring((c, d) => [x - r * (q * c + t * p * d), y + r * (p * c - t * q * d), z + r * u * d]), ring((c, d) => [x + r * c, y + r * d, z])];
+      }
+      if (s.round === 2) {
+        const [x, y] = s.centre, r = s.size[0], [low, high] = reach[2];
+        const [c, d] = [-Math.sin(azimuth), Math.cos(azimuth)];
+        const side = [[1, low], [1, high], [-1, high], [-1, low]].map(([e, z]) => [x + e * r * c, y + e * r * d, z]);
+        return [side, ...[low, high].map((z) => ring((e, f) => [x + r * e, y + r * f, z]))];
+      }
+      const six = [0, 1, 2].flatMap((axis) => [-1, 1].map((sign) => [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([i, j]) => {
+        const corner = [i, j];
+        corner.splice(axis, 0, sign);
+        return at(...corner);
+      })));
+      return six;
+    };
+    let movers3 = [];
+    const draw = () => {
+      svg.textContent = "";
+      const [[x0, x1], [y0, y1]] = reach;
+      make("path", { class: "floor", d: line([[x0, y0, reach[2][0]], [x1, y0, reach[2][0]], [x1, y1, reach[2][0]], [x0, y1, reach[2][0]]], true) }, svg);
+      for (const [name, p] of [["x", [x1, y0, reach[2][0]]], ["y", [x0, y1, reach[2][0]]]]) {
+        const [across, down] = seen(p);
+        make("text", { class: "name", x: across, y: down + 14, "text-anchor": "middle" }, svg).textContent = name;
+      }
+      // What is far first.
+      for (const s of [...scene.solids].sort((a, b) => seen(a.centre)[2] - seen(b.centre)[2])) {
+        const node = make("path", { class: s.obstacle ? "obstacle" : "safe", d: faces(s).map((f) => line(f, true)).join("") }, svg);
+        make("title", {}, node).textContent = s.label;
+        const [across, down] = seen([s.centre[0], s.centre[1], s.round === 2 ? reach[2][1] : s.centre[2] + s.size[2]]);
+        make("text", { class: "name", x: across, y: down - 5, "text-anchor": "middle" }, svg).textContent = s.label;
+      }
+      movers3 = flyers.map((v) => {
+        const hue = colour(scene.vehicles.indexOf(v)), points = v.x.map((x, k) => [x, v.y[k], v.z[k]]).filter((p) => p.every(Number.isFinite));
+        make("path", { class: "shadow", d: line(points.map(([x, y]) => [x, y, reach[2][0]])) }, svg);
+        make("path", { class: "trail", stroke: hue, opacity: 0.4, d: line(points) }, svg);
+        const trail = make("path", { class: "trail", stroke: hue }, svg), drop = make("path", { class: "shadow" }, svg);
+        const node = make("circle", { class: "vehicle", r: 7, fill: hue }, svg);
+        make("title", {}, node).textContent = v.label;
+        return (t) => {
+          const at = between(v.time, [v.x, v.y, v.z], t), until = before(v.time, t);
+          if (!at.every(Number.isFinite)) return;
+          trail.setAttribute("d", line([...points.slice(0, until + 1), at]));
+          drop.setAttribute("d", line([at, [at[0], at[1], reach[2][0]]]));
+          const [across, down] = seen(at);
+          node.setAttribute("cx", across);
+          node.setAttribute("cy", down);
+        };
+      });
+      for (const move of movers3) move(time);
+    };
+    let from = null;
+    svg.addEventListener("pointerdown", (event) => { from = [event.clientX, event.clientY, azimuth, elevation]; svg.setPointerCapture(event.pointerId); });
+    svg.addEventListener("pointermove", (event) => {
+      if (!from) return;
+      azimuth = from[2] - (event.clientX - from[0]) / 150;
+      elevation = Math.min(1.5, Math.max(-0.2, from[3] + (event.clientY - from[1]) / 150));
+      draw();
+    });
+    for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, () => { from = null; });
+    draw();
+    movers.push((t) => { for (const move of movers3) move(t); });
+  }
+
   // A chart over time: a cursor, and a click that moves the time there.
   const cursor = (view) => {
     let line;

@@ -2,15 +2,12 @@
 
 use punctual_core::filter::Status;
 use punctual_cosim::recording::Recording;
-use punctual_fmu::configuration::{BarrierSection, Shape};
+use punctual_fmu::configuration::{BarrierSection, Point, Shape};
 use serde::Serialize;
 
-use crate::drawing::Part;
+use crate::drawing::{Part, Position};
 use crate::outlines;
 use crate::plot::{self, POINTS};
-
-/// The name of a state that is a heading, in rad from the x axis.
-const HEADING: &str = "x.theta";
 
 /// A vehicle that moves in a plane.
 #[derive(Serialize)]
@@ -22,6 +19,8 @@ pub(super) struct Vehicle {
     time: Vec<f64>,
     x: Vec<f64>,
     y: Vec<f64>,
+    /// Its height; empty if it moves in the plane alone.
+    pub(super) z: Vec<f64>,
     /// Its heading in rad; empty if it has none.
     heading: Vec<f64>,
 }
@@ -29,14 +28,16 @@ pub(super) struct Vehicle {
 impl Vehicle {
     /// All vehicles of `part` whose signals are recorded.
     pub(super) fn all(part: &Part<'_>, recording: &Recording) -> Vec<Self> {
-        let vehicle = |(label, place): (String, [String; 2])| {
+        let vehicle = |Position { label, place, height, heading }: Position| {
             let (x, y) = (recording.series(&place[0])?, recording.series(&place[1])?);
-            let heading = recording.series(&part.signal(HEADING)).unwrap_or_default();
+            let heading = recording.series(&heading).unwrap_or_default();
+            let z = height.and_then(|height| recording.series(&height)).unwrap_or_default();
             let mut channels = vec![&x[..], &y];
-            channels.extend((!heading.is_empty()).then_some(&heading[..]));
+            channels.extend([&heading[..], &z].into_iter().filter(|channel| !channel.is_empty()));
             let kept = plot::decimate(&channels, POINTS);
-            let [time, x, y, heading] = [recording.times(), &x, &y, &heading].map(|all| chosen(all, &kept));
-            Some(Self { label, place, time, x, y, heading })
+            let [time, x, y, z, heading] =
+                [recording.times(), &x, &y, &z, &heading].map(|all| chosen(all, &kept));
+            Some(Self { label, place, time, x, y, z, heading })
         };
         part.places().into_iter().filter_map(vehicle).collect()
     }
@@ -103,6 +104,46 @@ impl Outline {
             let reach = reach.filter(|_| !self.endless).unwrap_or_default();
             Some((low + reach.0, high + reach.1))
         })
+    }
+}
+
+/// A set in space.
+#[derive(Serialize)]
+pub(super) struct Solid {
+    label: String,
+    /// Whether its outside is the safe set.
+    obstacle: bool,
+    /// How many of the axes it is round about as one: 3 of a sphere, 2 of a cylinder without ends, 0 of a box.
+    round: usize,
+    centre: [f64; 3],
+    /// From the centre to its sides.
+    size: [f64; 3],
+    /// From the x axis, in rad.
+    angle: f64,
+}
+
+impl Solid {
+    /// The sets of `part` that are in space and stay where they are.
+    pub(super) fn all(part: &Part<'_>) -> Vec<Self> {
+        let Some(filter) = part.filter() else { return Vec::new() };
+        let still = |at: &Point| at.velocity == [0.0; 2] && !at.centre_input;
+        let solid = |section: &BarrierSection| {
+            let (round, obstacle, centre, size, angle) = match section.shape {
+                Shape::Sphere { centre, radius, .. } => (3, false, centre, [radius; 3], 0.0),
+                Shape::SphericalObstacle { centre, radius, .. } => (3, true, centre, [radius; 3], 0.0),
+                Shape::Box { centre, half_sides, angle } => (0, false, centre, half_sides, angle),
+                Shape::BoxObstacle { centre, half_sides, angle } => (0, true, centre, half_sides, angle),
+                Shape::Disc { at, radius, .. } | Shape::QuadraticDisc { at, radius } if still(&at) => {
+                    (2, false, [at.centre[0], at.centre[1], 0.0], [radius; 3], 0.0)
+                }
+                Shape::Obstacle { at, radius, .. } if still(&at) => {
+                    (2, true, [at.centre[0], at.centre[1], 0.0], [radius; 3], 0.0)
+                }
+                _ => return None,
+            };
+            Some(Self { label: section.name.clone(), obstacle, round, centre, size, angle })
+        };
+        filter.barrier.iter().filter_map(solid).collect()
     }
 }
 

@@ -5,7 +5,7 @@ use punctual_core::MAX_RELATIVE_DEGREE;
 use super::super::key::{
     Key, Section,
     Unit::{self, Is, OfH, OfHighestDerivative},
-    Value::{self, Count, Flag, Name, Number, Numbers, Pair, Text, Word},
+    Value::{self, Count, Flag, Name, Names, Number, Numbers, Pair, Place, Text, Word},
 };
 use super::super::{FilterConfiguration, Parameter, PlantSection, Range};
 use super::shape::NAMES;
@@ -55,8 +55,9 @@ const fn plain(
     Row { key: Key::new(name, value, default, meaning), parameters: &[] }
 }
 
-static KEYS: [Row; 40] = [
+static KEYS: [Row; 44] = [
     plain("name", Name, None, "unique; the prefix of its variables"),
+    plain("agent", Name, Some("every one"), "of a [team](#teams): the agent that it is for"),
     plain(
         "shape",
         Word(&NAMES),
@@ -241,16 +242,34 @@ static KEYS: [Row; 40] = [
     Row {
         key: Key {
             name: "centre",
-            value: Pair(M, Range::FINITE),
+            value: Place(M, Range::FINITE),
             default: Some(""),
-            meaning: "the centre, of a moving disc where it is at time 0; a point of the line of a half-plane",
+            meaning: "the centre, of a moving disc where it is at time 0; a point of the line of a half-plane; three numbers for a \
+                      sphere or a box",
         },
         parameters: &[
             part("[1]", "x of a point of the line", |b| b.shape.line().map(|(centre, _)| &mut centre[0])),
             part("[2]", "y of a point of the line", |b| b.shape.line().map(|(centre, _)| &mut centre[1])),
-            part("[1]", "centre along x, at time 0", |b| b.shape.centre().map(|c| &mut c[0])),
-            part("[2]", "centre along y, at time 0", |b| b.shape.centre().map(|c| &mut c[1])),
+            part("[1]", "centre along x, at time 0", |b| b.shape.centre().and_then(|c| c.get_mut(0))),
+            part("[2]", "centre along y, at time 0", |b| b.shape.centre().and_then(|c| c.get_mut(1))),
+            part("[3]", "centre along z", |b| b.shape.centre().and_then(|c| c.get_mut(2))),
         ],
+    },
+    plain(
+        "position",
+        Names,
+        Some("`x`, `y` and `z` of the model, or `x_p`, `y_p`, `z_p`, or `p_x`, `p_y`, `p_z`"),
+        "of a model of your own: the states that are the position which the shape is about, in m",
+    ),
+    plain("from", Names, Some(""), "`apart`: the states that are the other position"),
+    Row {
+        key: Key {
+            name: "distance",
+            value: Number(M, Range::POSITIVE),
+            default: Some(""),
+            meaning: "the least distance of the two positions",
+        },
+        parameters: &[whole("least distance of the two positions", |b| b.shape.distance())],
     },
     plain(
         "centre_input",
@@ -340,13 +359,14 @@ static KEYS: [Row; 40] = [
     Row {
         key: Key {
             name: "half_sides",
-            value: Pair(M, Range::POSITIVE),
+            value: Place(M, Range::POSITIVE),
             default: Some(""),
-            meaning: "the one at the angle, and the one across",
+            meaning: "the one at the angle, and the one across; of a box also the vertical one",
         },
         parameters: &[
-            part("[1]", "half side at the angle", |b| b.shape.half_sides().map(|a| &mut a[0])),
-            part("[2]", "half side across", |b| b.shape.half_sides().map(|a| &mut a[1])),
+            part("[1]", "half side at the angle", |b| b.shape.half_sides().and_then(|a| a.get_mut(0))),
+            part("[2]", "half side across", |b| b.shape.half_sides().and_then(|a| a.get_mut(1))),
+            part("[3]", "vertical half side", |b| b.shape.half_sides().and_then(|a| a.get_mut(2))),
         ],
     },
     Row {
@@ -354,7 +374,7 @@ static KEYS: [Row; 40] = [
             name: "angle",
             value: Number(Is("rad"), Range::FINITE),
             default: Some("0"),
-            meaning: "the angle from the x axis",
+            meaning: "the angle from the x axis, of a box about the vertical",
         },
         parameters: &[whole("from the x axis", |b| b.shape.angle())],
     },
@@ -415,7 +435,9 @@ impl BarrierSection {
         let mut reached = self.clone();
         let mut parameters = Vec::new();
         for row in &KEYS {
-            let (Number(unit, range) | Pair(unit, range)) = row.key.value else { continue };
+            let (Number(unit, range) | Pair(unit, range) | Place(unit, range)) = row.key.value else {
+                continue;
+            };
             let unit = unit.of_barrier(&self.unit(plant), degree.unwrap_or_default());
             for part in row.parameters.iter().filter(|part| (part.access)(&mut reached).is_some()) {
                 // Files count barriers from 0, as the error messages of serde do; FMI counts the components

@@ -6,14 +6,16 @@ use super::raw::RawBarrier;
 use super::reader::Kind;
 
 /// Shapes and those of what is outside of them.
-const OUTSIDE: [(&str, &str); 4] = [
+const OUTSIDE: [(&str, &str); 6] = [
     ("disc", "obstacle"),
+    ("sphere", "spherical_obstacle"),
+    ("box", "box_obstacle"),
     ("rectangle", "rectangular_obstacle"),
     ("ellipse", "elliptic_obstacle"),
     ("at_most", "at_least"),
 ];
 /// Shapes of places, where nobody is at all times by accident.
-const PLACES: [&str; 4] = ["disc", "quadratic_disc", "ellipse", "rectangle"];
+const PLACES: [&str; 6] = ["disc", "quadratic_disc", "ellipse", "rectangle", "sphere", "box"];
 /// By how much a time is later that has to be after another, as a part of it.
 const LATER: f64 = 1e-9;
 

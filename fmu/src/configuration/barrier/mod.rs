@@ -15,6 +15,7 @@ pub use shape::{Point, SHAPES, Shape, ShapeRow};
 pub(super) use keys::SECTION;
 pub(super) use mission::of_mission;
 pub(super) use raw::RawBarrier;
+pub(super) use shape::Region;
 
 use punctual_core::convergence::operator::Operator;
 use punctual_core::filter::{BarrierSettings, Infeasible, Method, ProfileKind};
@@ -109,6 +110,9 @@ pub struct BarrierSection {
     /// The set.
     #[serde(flatten)]
     pub shape: Shape,
+    /// The states that are the position, where the plant has no name and the set has a place.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub position: Vec<String>,
     /// Deadline T in s after the first step; none for a set that is only to be kept from a start inside it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub deadline: Option<f64>,
@@ -188,12 +192,13 @@ impl BarrierSection {
         plant: &PlantSection,
     ) -> Result<Self, ConfigurationError> {
         check_identifier(&format!("{path}.name"), &raw.name)?;
-        let shape = Shape::parse(&raw, path, plant)?;
+        let (shape, position) = Shape::parse(&raw, path, plant)?;
         let margin_given = Given(raw.margin.is_some());
         let margin = raw.margin.unwrap_or_else(|| default_margin(&shape, plant));
         Ok(Self {
             name: raw.name,
             shape,
+            position,
             deadline: raw.deadline,
             method: raw.method,
             profile: raw.profile,

@@ -5,10 +5,11 @@ use std::fmt;
 use serde::Deserialize;
 use serde::de::{Deserializer, EnumAccess, VariantAccess, Visitor};
 
+use super::super::model::usual_position;
 use super::super::unit::measured;
 use super::super::{ConfigurationError, PlantSection, check_unit};
 use super::Automatic;
-use super::raw::RawBarrier;
+use super::raw::{FromPlace, Place, RawBarrier};
 use super::shape::{NAMES, Point, SHAPES, Shape, ShapeRow};
 
 /// A shape by its name.
@@ -83,23 +84,98 @@ impl Reader<'_> {
     /// Refuses a shape that the plant has no states or no positions for.
     fn check_plant(&self) -> Result<(), ConfigurationError> {
         let (shape, plant) = (self.row.name, self.plant);
-        let own = ["expression", "external", "plugin", "at_most", "at_least"].contains(&shape);
+        let is_own = matches!(plant, PlantSection::Expressions(_));
+        let in_space = ["sphere", "spherical_obstacle", "box", "box_obstacle", "apart"].contains(&shape);
         let message = if plant.is_external() && shape != "external" {
             format!("is {shape:?}, which needs states; this plant has none, so it is \"external\"")
         } else if plant.plugin().is_some() && !["plugin", "external"].contains(&shape) {
             format!("is {shape:?}; the barriers of a plug-in are its own (\"plugin\")")
         } else if plant.plugin().is_none() && shape == "plugin" {
             format!("is {shape:?}, but the plant is not one")
-        } else if plant.reference().is_none() && !own {
+        } else if is_own && shape == "speed_limit" {
             format!("is {shape:?}, which is for the plants that have a name; give an `expression`")
+        } else if plant.reference().is_some() && in_space {
+            format!(
+                "is {shape:?}, which is for models of your own: the plants that have a name move in the plane, alone"
+            )
         } else {
             return Ok(());
         };
         self.refuse("shape", message)
     }
 
-    pub(super) fn centre(&self) -> Result<[f64; 2], ConfigurationError> {
-        self.need("centre", self.raw.centre)
+    /// The numbers of a key along the axes.
+    fn place<P: FromPlace>(&self, key: &str, value: Option<Place>) -> Result<P, ConfigurationError> {
+        let place = self.need(key, value)?;
+        P::from_place(place).map_or_else(
+            || {
+                let found = if matches!(place, Place::Plane(_)) { 2 } else { 3 };
+                self.refuse(key, format!("has {found} entries, must have {} for {}", P::COUNT, self.row.name))
+            },
+            Ok,
+        )
+    }
+
+    pub(super) fn centre<P: FromPlace>(&self) -> Result<P, ConfigurationError> {
+        self.place("centre", self.raw.centre)
+    }
+
+    pub(super) fn half_sides<P: FromPlace>(&self) -> Result<P, ConfigurationError> {
+        self.place("half_sides", self.raw.half_sides)
+    }
+
+    /// The states that are the position from which another is kept apart.
+    pub(super) fn from(&self) -> Result<Vec<String>, ConfigurationError> {
+        let from = self.need("from", self.raw.from.clone())?;
+        self.check_position("from", &from)?;
+        Ok(from)
+    }
+
+    /// Refuses what names no 2 or 3 different states.
+    fn check_position(&self, key: &str, position: &[String]) -> Result<(), ConfigurationError> {
+        if !(2..=3).contains(&position.len()) {
+            let count = entries(position.len());
+            return self.refuse(key, format!("has {count}, must have 2 or 3: states along x, y and z"));
+        }
+        let names: Vec<_> = self.plant.states().into_iter().map(|s| s.name).collect();
+        for (i, state) in position.iter().enumerate() {
+            if !names.contains(state) {
+                let names = names.join(", ");
+                return self.refuse(key, format!("has {state:?}, which is no state, must be of {names}"));
+            }
+            if position[..i].contains(state) {
+                return self.refuse(key, format!("has {state:?} twice, must be different states"));
+            }
+        }
+        Ok(())
+    }
+
+    /// The states that are the position along `axes` axes, of a plant without a name: those that the file gives, or those with
+    /// the usual names.
+    fn position(&self, axes: usize) -> Result<Vec<String>, ConfigurationError> {
+        let position = match &self.raw.position {
+            Some(position) => position.clone(),
+            None => {
+                let states = self.plant.states();
+                let names: Vec<&str> = states.iter().map(|state| state.name.as_str()).collect();
+                let missing = || {
+                    let names = names.join(", ");
+                    let message = format!(
+                        "missing, {} needs it here: the states that are the position along {}, of {names}",
+                        self.row.name,
+                        if axes == 2 { "x and y" } else { "x, y and z" }
+                    );
+                    self.refuse("position", message)
+                };
+                usual_position(&names, axes).map_or_else(missing, Ok)?
+            }
+        };
+        self.check_position("position", &position)?;
+        if position.len() != axes {
+            let count = entries(position.len());
+            return self.refuse("position", format!("has {count}, must have {axes} for {}", self.row.name));
+        }
+        Ok(position)
     }
 
     pub(super) fn point(&self) -> Result<Point, ConfigurationError> {
@@ -184,13 +260,19 @@ impl Reader<'_> {
     }
 }
 
+/// How many entries a list has, in words.
+pub(super) fn entries(count: usize) -> String {
+    if count == 1 { "1 entry".to_owned() } else { format!("{count} entries") }
+}
+
 impl Shape {
-    /// Parses the shape in `raw`, of a barrier of `plant`; `path` names the barrier in errors.
+    /// Parses the shape in `raw`, of a barrier of `plant`, and the states that are its position where the plant has no name;
+    /// `path` names the barrier in errors.
     pub(super) fn parse(
         raw: &RawBarrier,
         path: &str,
         plant: &PlantSection,
-    ) -> Result<Self, ConfigurationError> {
+    ) -> Result<(Self, Vec<String>), ConfigurationError> {
         let unstated = match raw.expression {
             _ if plant.plugin().is_some() => "plugin",
             _ if plant.is_external() => "external",
@@ -202,6 +284,28 @@ impl Shape {
         let reader = Reader { raw, row, path, plant };
         reader.check_plant()?;
         reader.check_keys()?;
-        (row.read)(&reader)
+        let shape = (row.read)(&reader)?;
+        if !matches!(plant, PlantSection::Expressions(_)) {
+            return match raw.position {
+                Some(_) => {
+                    reader.refuse("position", "is for models of your own; this plant has its own position")
+                }
+                None => Ok((shape, Vec::new())),
+            };
+        }
+        if shape.followed().is_some() {
+            return reader.refuse(
+                "centre_input",
+                "is for the plants that have a name; make the centre two states of the model",
+            );
+        }
+        let position = shape.axes().map_or_else(|| Ok(Vec::new()), |axes| reader.position(axes))?;
+        match &shape {
+            Shape::Apart { from, .. } if from.iter().any(|state| position.contains(state)) => reader.refuse(
+                "from",
+                format!("has a state of `position` ({}), must be another one", position.join(", ")),
+            ),
+            _ => Ok((shape, position)),
+        }
     }
 }

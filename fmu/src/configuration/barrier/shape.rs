@@ -1,11 +1,16 @@
 //! The shapes of barriers: the keys of each one, and the barrier that it adds to a filter.
 
-use punctual_core::Error;
+use core::f64::consts::SQRT_2;
+
+use punctual_core::barrier::Barrier;
 use punctual_core::barriers::{
-    DistanceDisc, Ellipse, HalfPlane, NormBound, Outside, QuadraticDisc, Rectangle, StateBound,
+    DistanceDisc, Ellipse, HalfPlane, NormBound, QuadraticDisc, Rectangle, StateBound,
 };
+use punctual_core::dynamics;
 use punctual_core::filter::{FilterBuilder, Motion};
 use punctual_core::plants::Signal;
+use punctual_core::scalar::Scalar;
+use punctual_core::{Error, ErrorKind, elementary};
 use serde::Serialize;
 
 use super::super::adding::Adding;
@@ -46,6 +51,16 @@ pub enum Shape {
     Rectangle { centre: [f64; 2], half_sides: [f64; 2], angle: f64 },
     /// [`Outside`] of a [`Rectangle`] that contains the true one.
     RectangularObstacle { centre: [f64; 2], half_sides: [f64; 2], angle: f64 },
+    /// A [`DistanceDisc`] in space.
+    Sphere { centre: [f64; 3], radius: f64, smoothing: Automatic },
+    /// What is outside of a [`Self::Sphere`].
+    SphericalObstacle { centre: [f64; 3], radius: f64, smoothing: Automatic },
+    /// A [`Rectangle`] in space, turned about the vertical.
+    Box { centre: [f64; 3], half_sides: [f64; 3], angle: f64 },
+    /// What is outside of a [`Self::Box`] that contains the true one.
+    BoxObstacle { centre: [f64; 3], half_sides: [f64; 3], angle: f64 },
+    /// The distance between two positions: what is outside of a [`DistanceDisc`] around the other one.
+    Apart { from: Vec<String>, distance: f64 },
     /// [`HalfPlane`].
     HalfPlane { centre: [f64; 2], normal: [f64; 2] },
     /// [`StateBound`] from above.
@@ -97,9 +112,69 @@ impl Point {
     }
 }
 
+/// The set of a shape along a plant with a name. One type for all shapes: what a filter needs of a barrier is compiled once for each
+/// plant.
+#[derive(Clone, Copy)]
+pub(in super::super) struct Region {
+    form: Form,
+    is_outside: bool,
+}
+
+#[derive(Clone, Copy)]
+enum Form {
+    Disc(DistanceDisc),
+    QuadraticDisc(QuadraticDisc),
+    Ellipse(Ellipse),
+    Rectangle(Rectangle),
+    HalfPlane(HalfPlane),
+    State(StateBound),
+    Norm(NormBound),
+}
+
+/// Calls a method of the barrier that `form` has.
+macro_rules! of_form {
+    ($form:expr, $barrier:ident => $call:expr) => {
+        match $form {
+            Form::Disc($barrier) => $call,
+            Form::QuadraticDisc($barrier) => $call,
+            Form::Ellipse($barrier) => $call,
+            Form::Rectangle($barrier) => $call,
+            Form::HalfPlane($barrier) => $call,
+            Form::State($barrier) => $call,
+            Form::Norm($barrier) => $call,
+        }
+    };
+}
+
+impl<const NX: usize> Barrier<NX> for Region {
+    // All of them are.
+    const ONE_SIDED_CURVATURE: bool = true;
+
+    fn value<S: Scalar>(&self, t: S, x: &[S; NX]) -> S {
+        let h = of_form!(&self.form, barrier => Barrier::<NX>::value(barrier, t, x));
+        if self.is_outside { -h } else { h }
+    }
+
+    fn highest(&self, time: [f64; 2], region: &dynamics::Region) -> Option<f64> {
+        if self.is_outside {
+            return None;
+        }
+        of_form!(&self.form, barrier => Barrier::<NX>::highest(barrier, time, region))
+    }
+
+    fn steepness(&self) -> Option<f64> {
+        of_form!(&self.form, barrier => Barrier::<NX>::steepness(barrier))
+    }
+
+    fn range_from(&self, t: f64, x: &[f64; NX]) -> Option<[f64; 2]> {
+        let [least, largest] = of_form!(&self.form, barrier => Barrier::<NX>::range_from(barrier, t, x))?;
+        Some(if self.is_outside { [-largest, -least] } else { [least, largest] })
+    }
+}
+
 /// The keys of a centre that may be an input.
-const MOVING: [&str; 6] =
-    ["smoothing", "velocity", "centre_input", "acceleration", "centre_error", "velocity_error"];
+const MOVING: [&str; 7] =
+    ["smoothing", "velocity", "centre_input", "acceleration", "centre_error", "velocity_error", "position"];
 
 /// A row of [`SHAPES`].
 pub struct ShapeRow {
@@ -116,7 +191,7 @@ pub struct ShapeRow {
 }
 
 /// The shapes by name.
-pub static SHAPES: [ShapeRow; 14] = [
+pub static SHAPES: [ShapeRow; 19] = [
     ShapeRow {
         name: "disc",
         meaning: "inside a disc, distance-shaped: take this one",
@@ -134,7 +209,7 @@ pub static SHAPES: [ShapeRow; 14] = [
         name: "quadratic_disc",
         meaning: "inside, the paper's R² − d²",
         required: &["centre", "radius"],
-        optional: &["velocity", "centre_input"],
+        optional: &["velocity", "centre_input", "position"],
         read: |r| Ok(Shape::QuadraticDisc { at: r.point()?, radius: r.need("radius", r.raw.radius)? }),
     },
     ShapeRow {
@@ -154,7 +229,7 @@ pub static SHAPES: [ShapeRow; 14] = [
         name: "ellipse",
         meaning: "inside",
         required: &["centre", "half_axes"],
-        optional: &["angle"],
+        optional: &["angle", "position"],
         read: |r| {
             let (centre, half_axes) = (r.centre()?, r.need("half_axes", r.raw.half_axes)?);
             Ok(Shape::Ellipse { centre, half_axes, angle: r.angle() })
@@ -164,7 +239,7 @@ pub static SHAPES: [ShapeRow; 14] = [
         name: "elliptic_obstacle",
         meaning: "outside of an ellipse",
         required: &["centre", "half_axes"],
-        optional: &["angle"],
+        optional: &["angle", "position"],
         read: |r| {
             let (centre, half_axes) = (r.centre()?, r.need("half_axes", r.raw.half_axes)?);
             Ok(Shape::EllipticObstacle { centre, half_axes, angle: r.angle() })
@@ -174,9 +249,9 @@ pub static SHAPES: [ShapeRow; 14] = [
         name: "rectangle",
         meaning: "inside, with corners rounded inwards",
         required: &["centre", "half_sides"],
-        optional: &["angle"],
+        optional: &["angle", "position"],
         read: |r| {
-            let (centre, half_sides) = (r.centre()?, r.need("half_sides", r.raw.half_sides)?);
+            let (centre, half_sides) = (r.centre()?, r.half_sides()?);
             Ok(Shape::Rectangle { centre, half_sides, angle: r.angle() })
         },
     },
@@ -184,17 +259,60 @@ pub static SHAPES: [ShapeRow; 14] = [
         name: "rectangular_obstacle",
         meaning: "outside of a rounded rectangle that contains it",
         required: &["centre", "half_sides"],
-        optional: &["angle"],
+        optional: &["angle", "position"],
         read: |r| {
-            let (centre, half_sides) = (r.centre()?, r.need("half_sides", r.raw.half_sides)?);
+            let (centre, half_sides) = (r.centre()?, r.half_sides()?);
             Ok(Shape::RectangularObstacle { centre, half_sides, angle: r.angle() })
         },
+    },
+    ShapeRow {
+        name: "sphere",
+        meaning: "inside a sphere, in space",
+        required: &["centre", "radius"],
+        optional: &["position", "smoothing"],
+        read: |r| {
+            let (centre, radius) = (r.centre()?, r.need("radius", r.raw.radius)?);
+            Ok(Shape::Sphere { centre, radius, smoothing: r.smoothing() })
+        },
+    },
+    ShapeRow {
+        name: "spherical_obstacle",
+        meaning: "outside of a sphere",
+        required: &["centre", "radius"],
+        optional: &["position", "smoothing"],
+        read: |r| {
+            let (centre, radius) = (r.centre()?, r.need("radius", r.raw.radius)?);
+            Ok(Shape::SphericalObstacle { centre, radius, smoothing: r.smoothing() })
+        },
+    },
+    ShapeRow {
+        name: "box",
+        meaning: "inside a box, with edges rounded inwards, in space",
+        required: &["centre", "half_sides"],
+        optional: &["position", "angle"],
+        read: |r| Ok(Shape::Box { centre: r.centre()?, half_sides: r.half_sides()?, angle: r.angle() }),
+    },
+    ShapeRow {
+        name: "box_obstacle",
+        meaning: "outside of a rounded box that contains it",
+        required: &["centre", "half_sides"],
+        optional: &["position", "angle"],
+        read: |r| {
+            Ok(Shape::BoxObstacle { centre: r.centre()?, half_sides: r.half_sides()?, angle: r.angle() })
+        },
+    },
+    ShapeRow {
+        name: "apart",
+        meaning: "two positions at least `distance` apart",
+        required: &["from", "distance"],
+        optional: &["position"],
+        read: |r| Ok(Shape::Apart { from: r.from()?, distance: r.need("distance", r.raw.distance)? }),
     },
     ShapeRow {
         name: "half_plane",
         meaning: "one side of a line; two of them are a corridor",
         required: &["centre", "normal"],
-        optional: &[],
+        optional: &["position"],
         read: |r| Ok(Shape::HalfPlane { centre: r.centre()?, normal: r.need("normal", r.raw.normal)? }),
     },
     ShapeRow {
@@ -275,6 +393,11 @@ impl Shape {
             Self::EllipticObstacle { .. } => "elliptic_obstacle",
             Self::Rectangle { .. } => "rectangle",
             Self::RectangularObstacle { .. } => "rectangular_obstacle",
+            Self::Sphere { .. } => "sphere",
+            Self::SphericalObstacle { .. } => "spherical_obstacle",
+            Self::Box { .. } => "box",
+            Self::BoxObstacle { .. } => "box_obstacle",
+            Self::Apart { .. } => "apart",
             Self::HalfPlane { .. } => "half_plane",
             Self::AtMost { .. } => "at_most",
             Self::AtLeast { .. } => "at_least",
@@ -282,6 +405,31 @@ impl Shape {
             Self::Expression { .. } => "expression",
             Self::Plugin { .. } => "plugin",
             Self::External { .. } => "external",
+        }
+    }
+
+    /// The axes of the position that it is of; `None` if it is of none.
+    pub(super) fn axes(&self) -> Option<usize> {
+        match self {
+            Self::Disc { .. }
+            | Self::QuadraticDisc { .. }
+            | Self::Obstacle { .. }
+            | Self::Ellipse { .. }
+            | Self::EllipticObstacle { .. }
+            | Self::Rectangle { .. }
+            | Self::RectangularObstacle { .. }
+            | Self::HalfPlane { .. } => Some(2),
+            Self::Sphere { .. }
+            | Self::SphericalObstacle { .. }
+            | Self::Box { .. }
+            | Self::BoxObstacle { .. } => Some(3),
+            Self::Apart { from, .. } => Some(from.len()),
+            Self::AtMost { .. }
+            | Self::AtLeast { .. }
+            | Self::SpeedLimit { .. }
+            | Self::Expression { .. }
+            | Self::Plugin { .. }
+            | Self::External { .. } => None,
         }
     }
 
@@ -309,17 +457,23 @@ impl Shape {
             | Self::EllipticObstacle { half_axes: [a, b], .. }
             | Self::Rectangle { half_sides: [a, b], .. }
             | Self::RectangularObstacle { half_sides: [a, b], .. } => Some(a.min(b)),
+            Self::Sphere { radius, .. } | Self::SphericalObstacle { radius, .. } => Some(radius),
+            Self::Box { half_sides: [a, b, c], .. } | Self::BoxObstacle { half_sides: [a, b, c], .. } => {
+                Some(a.min(b).min(c))
+            }
+            Self::Apart { distance, .. } => Some(distance),
             _ => None,
         }
     }
 
-    /// The position in m at which h is largest, on a plant with a name; `None` where that is not known.
-    pub(in super::super) fn inmost(&self) -> Option<[f64; 2]> {
-        match *self {
-            Self::Disc { at, .. } | Self::QuadraticDisc { at, .. } => Some(at.centre),
+    /// The position in m at which h is largest; `None` where that is not known.
+    pub(in super::super) fn inmost(&self) -> Option<&[f64]> {
+        match self {
+            Self::Disc { at, .. } | Self::QuadraticDisc { at, .. } => Some(&at.centre),
             Self::Ellipse { centre, .. } | Self::Rectangle { centre, .. } => Some(centre),
+            Self::Sphere { centre, .. } | Self::Box { centre, .. } => Some(centre),
             // A speed limit is largest at rest, wherever that is.
-            Self::SpeedLimit { .. } => Some([0.0; 2]),
+            Self::SpeedLimit { .. } => Some(&[0.0; 2]),
             _ => None,
         }
     }
@@ -336,46 +490,153 @@ impl Shape {
 
     /// Adds the barrier of this shape to a filter.
     pub(in super::super) fn add(&self, to: Adding<'_>) -> Result<FilterBuilder, ConfigurationError> {
-        let state = |on: &[Signal], name: &str| on.iter().position(|s| s.name == name);
+        if let Some(expression) = to.own_position().and_then(|position| self.expression(position)) {
+            return to.expression(&expression);
+        }
         match self {
-            Self::Disc { at, radius, smoothing } => to.along(|on| at.disc(*radius, *smoothing, on)),
-            Self::Obstacle { at, radius, smoothing } => {
-                to.along(|on| at.disc(*radius, *smoothing, on).map(Outside))
-            }
-            Self::QuadraticDisc { at, radius } => to.along(|on| {
-                let disc = QuadraticDisc::new(at.centre, *radius)?.moving(at.velocity)?;
-                Ok(if at.centre_input { disc.following(on.len()) } else { disc })
-            }),
-            Self::Ellipse { centre, half_axes, angle } => {
-                to.along(|_| Ellipse::new(*centre, *half_axes, *angle))
-            }
-            Self::EllipticObstacle { centre, half_axes, angle } => {
-                to.along(|_| Ellipse::new(*centre, *half_axes, *angle).map(Outside))
-            }
-            Self::Rectangle { centre, half_sides, angle } => {
-                to.along(|_| Rectangle::new(*centre, *half_sides, *angle))
-            }
-            Self::RectangularObstacle { centre, half_sides, angle } => {
-                to.along(|_| Ok(Outside(Rectangle::new(*centre, *half_sides, *angle)?.around())))
-            }
-            Self::HalfPlane { centre, normal } => to.along(|_| HalfPlane::new(*normal, *centre)),
             // Where the plant has no name, as the expression that it is.
             Self::AtMost { state, bound } if to.is_own() => to.expression(&format!("{bound:?} - {state}")),
             Self::AtLeast { state, bound } if to.is_own() => to.expression(&format!("{state} - ({bound:?})")),
-            Self::AtMost { state: name, bound } => {
-                to.along(|on| StateBound::at_most(state(on, name).unwrap_or(usize::MAX), *bound))
-            }
-            Self::AtLeast { state: name, bound } => {
-                to.along(|on| StateBound::at_least(state(on, name).unwrap_or(usize::MAX), *bound))
-            }
-            Self::SpeedLimit { bound } => to.along(|on| match state(on, "v") {
-                Some(speed) => NormBound::of_one(speed, *bound),
-                None => NormBound::new(state(on, "v_x").unwrap_or(usize::MAX), *bound),
-            }),
             Self::Expression { expression, .. } => to.expression(expression),
             Self::Plugin { output, .. } => to.plugin(output),
             Self::External { relative_degree, .. } => to.external(*relative_degree),
+            _ => to.along(|on| self.region(on)),
         }
+    }
+
+    /// Its set along a plant with a name and these states.
+    fn region(&self, on: &[Signal]) -> Result<Region, Error> {
+        let state = |name: &str| on.iter().position(|s| s.name == name);
+        let within = |form: Form| Region { form, is_outside: false };
+        let outside = |form: Form| Region { form, is_outside: true };
+        Ok(match self {
+            Self::Disc { at, radius, smoothing } => within(Form::Disc(at.disc(*radius, *smoothing, on)?)),
+            Self::Obstacle { at, radius, smoothing } => {
+                outside(Form::Disc(at.disc(*radius, *smoothing, on)?))
+            }
+            Self::QuadraticDisc { at, radius } => {
+                let disc = QuadraticDisc::new(at.centre, *radius)?.moving(at.velocity)?;
+                within(Form::QuadraticDisc(if at.centre_input { disc.following(on.len()) } else { disc }))
+            }
+            Self::Ellipse { centre, half_axes, angle } => {
+                within(Form::Ellipse(Ellipse::new(*centre, *half_axes, *angle)?))
+            }
+            Self::EllipticObstacle { centre, half_axes, angle } => {
+                outside(Form::Ellipse(Ellipse::new(*centre, *half_axes, *angle)?))
+            }
+            Self::Rectangle { centre, half_sides, angle } => {
+                within(Form::Rectangle(Rectangle::new(*centre, *half_sides, *angle)?))
+            }
+            Self::RectangularObstacle { centre, half_sides, angle } => {
+                outside(Form::Rectangle(Rectangle::new(*centre, *half_sides, *angle)?.around()))
+            }
+            Self::HalfPlane { centre, normal } => within(Form::HalfPlane(HalfPlane::new(*normal, *centre)?)),
+            Self::AtMost { state: name, bound } => {
+                within(Form::State(StateBound::at_most(state(name).unwrap_or(usize::MAX), *bound)?))
+            }
+            Self::AtLeast { state: name, bound } => {
+                within(Form::State(StateBound::at_least(state(name).unwrap_or(usize::MAX), *bound)?))
+            }
+            Self::SpeedLimit { bound } => within(Form::Norm(match state("v") {
+                Some(speed) => NormBound::of_one(speed, *bound)?,
+                None => NormBound::new(state("v_x").unwrap_or(usize::MAX), *bound)?,
+            })),
+            _ => {
+                let message = format!("is {:?}, which is for models of your own", self.name());
+                return Err(Error::new(ErrorKind::Range, "shape", message));
+            }
+        })
+    }
+
+    /// h as an expression where the states `position` are that, in the order of the axes; `None` of a shape that has no place.
+    /// It equals what the core has for the vehicles with a name.
+    fn expression(&self, position: &[String]) -> Option<String> {
+        let away = |centre: &[f64]| -> Vec<String> {
+            position.iter().zip(centre).map(|(p, c)| format!("({p} - ({c:?}))")).collect()
+        };
+        let away_from = |at: &Point| -> Vec<String> {
+            let moved = |(length, velocity): (String, f64)| match velocity {
+                0.0 => length,
+                _ => format!("({length} - ({velocity:?})*t)"),
+            };
+            away(&at.centre).into_iter().zip(at.velocity).map(moved).collect()
+        };
+        // Along the axes that are turned by an angle about the vertical.
+        let turned = |centre: &[f64], angle: f64| -> Vec<String> {
+            let (sin, cos) = elementary::sin_cos(angle);
+            let mut axes = away(centre);
+            if angle != 0.0
+                && let [x, y, ..] = &mut axes[..]
+            {
+                let along = format!("({cos:?}*{x} + ({sin:?})*{y})");
+                (*x, *y) = (along, format!("({cos:?}*{y} - ({sin:?})*{x})"));
+            }
+            axes
+        };
+        let squares = |lengths: &[String]| -> String {
+            lengths.iter().map(|length| format!("{length}^2")).collect::<Vec<_>>().join(" + ")
+        };
+        // How far the length of `lengths` is below `radius`.
+        let below = |lengths: &[String], radius: f64, smoothing: f64| {
+            let level = elementary::hypot(radius, smoothing);
+            format!("{level:?} - sqrt({} + {:?})", squares(lengths), smoothing * smoothing)
+        };
+        let round = |lengths: &[String], radius: f64, smoothing: Automatic| {
+            below(lengths, radius, smoothing.given().unwrap_or(radius))
+        };
+        let scaled = |lengths: Vec<String>, sizes: &[f64]| -> Vec<String> {
+            lengths.iter().zip(sizes).map(|(length, size)| format!("({length}/{size:?})")).collect()
+        };
+        let least = |sizes: &[f64]| sizes.iter().copied().fold(f64::INFINITY, f64::min);
+        let ellipse = |centre: &[f64], sizes: &[f64], angle: f64| {
+            let lengths = scaled(turned(centre, angle), sizes);
+            format!("{:?}*({SQRT_2:?} - sqrt({} + 1.0))", least(sizes), squares(&lengths))
+        };
+        // Within the true one; `around` it the same with larger sides.
+        let cuboid = |centre: &[f64], sizes: &[f64], angle: f64| {
+            let lengths = scaled(turned(centre, angle), sizes);
+            let powers = lengths.iter().map(|length| format!("{length}^4")).collect::<Vec<_>>().join(" + ");
+            format!("{:?}*({:?} - sqrt(sqrt({powers} + 1.0)))", least(sizes), elementary::powf(2.0, 0.25))
+        };
+        // Until its corners, each at 1 along every axis, are on the edge.
+        let around = |centre: &[f64], sizes: &[f64], angle: f64| {
+            let factor = elementary::powf(sizes.len() as f64, 0.25);
+            cuboid(centre, &sizes.iter().map(|size| size * factor).collect::<Vec<_>>(), angle)
+        };
+        let outside = |h: String| format!("-({h})");
+        Some(match self {
+            Self::Disc { at, radius, smoothing } => round(&away_from(at), *radius, *smoothing),
+            Self::Obstacle { at, radius, smoothing } => outside(round(&away_from(at), *radius, *smoothing)),
+            Self::QuadraticDisc { at, radius } => {
+                format!("{:?} - ({})", radius * radius, squares(&away_from(at)))
+            }
+            Self::Sphere { centre, radius, smoothing } => round(&away(centre), *radius, *smoothing),
+            Self::SphericalObstacle { centre, radius, smoothing } => {
+                outside(round(&away(centre), *radius, *smoothing))
+            }
+            Self::Ellipse { centre, half_axes, angle } => ellipse(centre, half_axes, *angle),
+            Self::EllipticObstacle { centre, half_axes, angle } => {
+                outside(ellipse(centre, half_axes, *angle))
+            }
+            Self::Rectangle { centre, half_sides, angle } => cuboid(centre, half_sides, *angle),
+            Self::RectangularObstacle { centre, half_sides, angle } => {
+                outside(around(centre, half_sides, *angle))
+            }
+            Self::Box { centre, half_sides, angle } => cuboid(centre, half_sides, *angle),
+            Self::BoxObstacle { centre, half_sides, angle } => outside(around(centre, half_sides, *angle)),
+            Self::HalfPlane { centre, normal } => {
+                let length = elementary::hypot(normal[0], normal[1]);
+                let parts = away(centre).into_iter().zip(normal);
+                let parts = parts.map(|(length_along, part)| format!("({:?})*{length_along}", part / length));
+                parts.collect::<Vec<_>>().join(" + ")
+            }
+            Self::Apart { from, distance } => {
+                let lengths: Vec<_> =
+                    position.iter().zip(from).map(|(p, other)| format!("({p} - {other})")).collect();
+                outside(below(&lengths, *distance, *distance))
+            }
+            _ => return None,
+        })
     }
 }
 
@@ -415,13 +676,17 @@ impl Shape {
         }
     }
 
-    pub(super) fn centre(&mut self) -> Option<&mut [f64; 2]> {
+    pub(super) fn centre(&mut self) -> Option<&mut [f64]> {
         match self {
+            Self::Sphere { centre, .. }
+            | Self::SphericalObstacle { centre, .. }
+            | Self::Box { centre, .. }
+            | Self::BoxObstacle { centre, .. } => Some(centre),
             Self::Ellipse { centre, .. }
             | Self::EllipticObstacle { centre, .. }
             | Self::Rectangle { centre, .. }
             | Self::RectangularObstacle { centre, .. } => Some(centre),
-            _ => self.point().map(|at| &mut at.centre),
+            _ => self.point().map(|at| &mut at.centre[..]),
         }
     }
 
@@ -436,14 +701,19 @@ impl Shape {
         match self {
             Self::Disc { radius, .. }
             | Self::QuadraticDisc { radius, .. }
-            | Self::Obstacle { radius, .. } => Some(radius),
+            | Self::Obstacle { radius, .. }
+            | Self::Sphere { radius, .. }
+            | Self::SphericalObstacle { radius, .. } => Some(radius),
             _ => None,
         }
     }
 
     pub(super) fn smoothing(&mut self) -> Option<&mut f64> {
         match self {
-            Self::Disc { smoothing, .. } | Self::Obstacle { smoothing, .. } => Some(&mut smoothing.0),
+            Self::Disc { smoothing, .. }
+            | Self::Obstacle { smoothing, .. }
+            | Self::Sphere { smoothing, .. }
+            | Self::SphericalObstacle { smoothing, .. } => Some(&mut smoothing.0),
             _ => None,
         }
     }
@@ -455,8 +725,9 @@ impl Shape {
         }
     }
 
-    pub(super) fn half_sides(&mut self) -> Option<&mut [f64; 2]> {
+    pub(super) fn half_sides(&mut self) -> Option<&mut [f64]> {
         match self {
+            Self::Box { half_sides, .. } | Self::BoxObstacle { half_sides, .. } => Some(half_sides),
             Self::Rectangle { half_sides, .. } | Self::RectangularObstacle { half_sides, .. } => {
                 Some(half_sides)
             }
@@ -469,7 +740,9 @@ impl Shape {
             Self::Ellipse { angle, .. }
             | Self::EllipticObstacle { angle, .. }
             | Self::Rectangle { angle, .. }
-            | Self::RectangularObstacle { angle, .. } => Some(angle),
+            | Self::RectangularObstacle { angle, .. }
+            | Self::Box { angle, .. }
+            | Self::BoxObstacle { angle, .. } => Some(angle),
             _ => None,
         }
     }
@@ -477,6 +750,13 @@ impl Shape {
     pub(super) fn bound(&mut self) -> Option<&mut f64> {
         match self {
             Self::AtMost { bound, .. } | Self::AtLeast { bound, .. } => Some(bound),
+            _ => None,
+        }
+    }
+
+    pub(super) fn distance(&mut self) -> Option<&mut f64> {
+        match self {
+            Self::Apart { distance, .. } => Some(distance),
             _ => None,
         }
     }
