@@ -1,18 +1,20 @@
-"""Drives filters for the scenarios of stlpy against controllers that want something else, and lets others judge the runs.
+"""Drives filters for scenarios of stlpy against controllers that want something else, and lets others judge the runs.
 
-    judge.py [--runs N] [--only PATTERN] [--drawn K] [--solvers] [--json FILE]
+    judge.py [--runs N] [--only PATTERN] [--drawn K] [--json FILE]
+    judge.py --solvers [--only PATTERN]
 
-Each file beside this one is a scenario of stlpy 0.3; RandomMultitarget is drawn here, as stlpy draws it. For each run a filter takes
-its first step, which searches for a plan, and is then copied for controllers that want nothing, to brake, anything, to be somewhere
-else, and to be far from every goal. The plant is integrated here. A run is judged at DENSE instants of each step by
+Each file beside this one is a scenario of stlpy 0.3; RandomMultitarget is drawn here, as stlpy draws it. From each
+start a filter takes its first step, which searches for a plan, and is then copied for controllers that want nothing,
+to brake, to be far from every goal, anything, and to be somewhere else. The plant is integrated here. A run is judged
+at DENSE instants of each step by
 
 - rtamt, from the text of the mission and the h of its regions, computed here,
 - the specification of stlpy with its own sharp rectangles, written down here,
 - the bounds of stlpy's example on inputs and states,
 - and the flag: it may not fall without a reason, and nothing may be missed while it stands.
 
-Prints a table. Fails if something is missed while the flag stands. With --solvers it
-prints how long stlpy's own solvers take for the same scenarios.
+Prints a table. Fails if something is missed while the flag stands. With --solvers it prints how long stlpy's own
+solvers take for the same scenarios instead.
 """
 
 import argparse
@@ -45,7 +47,9 @@ ROUND_OFF = 1e-9
 # The limit of a solver in s.
 SOLVER_LIMIT = 60.0
 
-CONTROLLERS = ["nothing", "brakes", "random", "elsewhere", "hostile"]
+# What controllers want, and how many runs there are of each from a start.
+CONTROLLERS = {"nothing": 1, "brakes": 1, "hostile": 1, "random": 4, "elsewhere": 4}
+RUNS = sum(CONTROLLERS.values())
 
 
 # Scenarios
@@ -170,6 +174,18 @@ def stepping_stones(name, seed, start):
         return min(always(stones), ever(depth(stl.target, path)))
 
     return Scenario(name, stl, 15.0, [*start, 0.0, 0.0], spec, places=[middle(stl.target)])
+
+
+def connected(stones, place):
+    """The stones to which a chain of stones that touch leads from a place. Who does not leap reaches no others."""
+
+    def touch(a, b):
+        return max(a[0], b[0]) <= min(a[1], b[1]) and max(a[2], b[2]) <= min(a[3], b[3])
+
+    found = {i for i, stone in enumerate(stones) if touch(stone, (place[0], place[0], place[1], place[1]))}
+    while more := {i for i, s in enumerate(stones) if i not in found and any(touch(s, stones[j]) for j in found)}:
+        found |= more
+    return found
 
 
 def random_multitarget(seed):
@@ -301,7 +317,7 @@ def avoided(stl):
 
 
 def run(scenario, filter, first, start, controller):
-    """A run from `start` on, where `filter` has taken its step `first`: times, states, inputs, and where the flag stood."""
+    """A run from `start`, where `filter` has taken its step `first`: times, states, inputs, and the flag."""
     steps = round((scenario.horizon + AFTER) / scenario.step)
     x, found = start, first
     path, inputs, flags = [x], [], []
@@ -415,10 +431,11 @@ def of_scenario(scenario, starts):
         accepted = first.assurance == punctual.Assurance.ASSURED and not left_out
         row = {"scenario": scenario.name, "start": start.tolist(), "accepted": bool(accepted), "search": search}
         if not accepted:
-            said = f"not promised, though assured: {', '.join(left_out)}" if begun.refusal is None else begun.refusal
-            rows.append(row | {"refusal": said})
+            state = punctual.Assurance(first.assurance).name.lower()
+            left_out = f"{state}, without a promise for {', '.join(left_out) or 'nothing'}"
+            rows.append(row | {"refusal": begun.refusal or left_out})
             continue
-        for kind in CONTROLLERS:
+        for kind in (kind for kind, count in CONTROLLERS.items() for _ in range(count)):
             controller = Controller(scenario, kind, generator)
             clock = time.perf_counter()
             seen = run(scenario, copy.deepcopy(begun), first, start, controller)
@@ -426,11 +443,12 @@ def of_scenario(scenario, starts):
     return rows
 
 
-HEAD = ["scenario", "accepted", "of", "first step s", "longest s", "runs", "rtamt > 0", "stlpy > 0", "withdrawn", "broken"]
+HEAD = ["scenario", "accepted", "of", "first step s", "longest s", "runs"]
+HEAD += ["rtamt > 0", "stlpy > 0", "withdrawn", "broken"]
 
 
 def line(name, rows):
-    starts = {tuple(row["start"]): row for row in rows}
+    starts = {(row["scenario"], *row["start"]): row for row in rows}
     own, runs = rows[0], [row for row in rows if row["accepted"]]
     searches = [row["search"] for row in starts.values()]
     return [
@@ -530,9 +548,9 @@ def ask_solvers(only):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--runs", type=int, default=200, help="at least as many runs of what is accepted, if all is")
+    parser.add_argument("--runs", type=int, default=200, help="at least as many runs, if every start is accepted")
     parser.add_argument("--only", default="*", metavar="PATTERN", help="scenarios of such names")
-    parser.add_argument("--drawn", type=int, default=0, help="further seeds of RandomMultitarget, from one start each")
+    parser.add_argument("--drawn", type=int, default=0, help="further seeds of RandomMultitarget")
     parser.add_argument("--json", help="a file for every run")
     parser.add_argument("--solvers", action="store_true", help="only the times of stlpy's solvers")
     parser.add_argument("--solve", nargs=2, help=argparse.SUPPRESS)
@@ -543,9 +561,10 @@ def main():
     if arguments.solvers:
         return ask_solvers(arguments.only)
     chosen = [scenario for scenario in scenarios(arguments.drawn) if fnmatch.fnmatch(scenario.name, arguments.only)]
-    # What is drawn further, or refused, has one start.
-    several = [s for s in chosen if not re.fullmatch("stepping_stones|random_multitarget_[1-9].*", s.name)]
-    starts = math.ceil(arguments.runs / len(CONTROLLERS) / max(len(several), 1))
+    # Of RandomMultitarget there are several draws rather than starts; what cannot be promised is not tried again.
+    one = [s for s in chosen if re.fullmatch(r"stepping_stones|random_multitarget_\d+", s.name)]
+    several = [s for s in chosen if s not in one]
+    starts = math.ceil(max(arguments.runs / RUNS - len(one), 1) / max(len(several), 1))
     table, rows = [HEAD], []
     for scenario in chosen:
         found = of_scenario(scenario, starts if scenario in several else 1)
@@ -555,9 +574,13 @@ def main():
         if arguments.json:
             pathlib.Path(arguments.json).write_text(json.dumps(rows, indent=1), encoding="utf-8")
     show([*table, line("all", rows)])
+    stones = {s.name: s.stl.stones for s in chosen if isinstance(s.stl, benchmarks.SteppingStones)}
     for row in rows:
         if not row["accepted"]:
             print(f"refused: {row['scenario']} from {row['start'][:2]}: {row['refusal']}")
+            of = stones.get(row["scenario"])
+            if of and len(of) - 1 not in connected(of, row["start"]):
+                print("  rightly: no chain of stones that touch leads from there to the last one")
         elif row["broken"] or row["withdrawn"] or not row["kept"]:
             print(f"look at: {row}")
     accepted = [row for row in rows if row["accepted"]]
