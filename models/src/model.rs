@@ -302,13 +302,19 @@ impl Equations for Listed {
         Self { steps: self.last.clone(), ..self.clone() }
     }
 
+    fn reads(&self, i: usize) -> bool {
+        let read = |step: &Step| step.operation.reads().contains(&Some(i));
+        self.h == Some(i) || self.last.iter().any(read)
+    }
+
     fn of_barrier(&self) -> Self {
         let mut wanted: Vec<Register> = self.h.into_iter().collect();
         let mut moving = vec![false; self.states];
         loop {
             let steps = needed(&self.steps, &wanted, self.registers);
             let read = steps.iter().flat_map(|step| step.operation.reads()).flatten();
-            let read: Vec<Register> = read.chain(wanted.iter().copied()).filter(|r| *r < self.states).collect();
+            let read: Vec<Register> =
+                read.chain(wanted.iter().copied()).filter(|r| *r < self.states).collect();
             let count = wanted.len();
             for state in read {
                 if !std::mem::replace(&mut moving[state], true) {

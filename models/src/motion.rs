@@ -62,6 +62,12 @@ pub(crate) trait Equations: Clone + Send + 'static {
         self.clone()
     }
 
+    /// Whether the value of the barrier reads state `i`; false only if it certainly does not.
+    fn reads(&self, i: usize) -> bool {
+        let _ = i;
+        true
+    }
+
     /// Computes the coefficients of the barrier up to `n`, after those of the states, and returns their
     /// register.
     fn finish<C: Scalar>(&mut self, series: &mut Series<C>, n: usize) -> Register;
@@ -133,11 +139,12 @@ pub(crate) fn source<E: Equations>(
             flow_tangent: Flow::new(plant),
             path: Along::new(plant, &of_motion, EXPANSION_ORDERS - 1),
             expansions: Along::new(plant, &of_value, EXPANSION_ORDERS - 1),
-            value: Along::new(plant, &of_value, 1),
+            value: Along::new(plant, &of_value, 0),
             few_over: Along::new(plant, &of_value, 1),
             path_over: Along::new(plant, &of_motion, EXPANSION_ORDERS - 1),
             expansions_over: Along::new(plant, &of_value, EXPANSION_ORDERS - 1),
             second: Along::new(plant, &of_value, 1),
+            reads: (0..plant.states()).map(|i| of_value.reads(i)).collect(),
             held: vec![[Interval::ALL; 2]; plant.states()],
             rate: vec![0.0; plant.states()],
         };
@@ -291,7 +298,9 @@ impl<E: Equations, C: Scalar> Along<E, C> {
     fn new(plant: &E, along: &E, n: usize) -> Self {
         let mut series = along.series(n + 1);
         // Time has slope 1; inputs are held.
-        series.set(along.states() + along.inputs(), 1, C::from(1.0));
+        if n > 0 {
+            series.set(along.states() + along.inputs(), 1, C::from(1.0));
+        }
         Self { flow: Flow::new(plant), equations: along.clone(), series, h: 0, n }
     }
 
@@ -399,6 +408,8 @@ struct Work<E, const M: usize> {
     path_over: Along<E, Interval>,
     expansions_over: Along<E, Interval>,
     second: Along<E, Second>,
+    /// Whether h reads each state.
+    reads: Vec<bool>,
     /// Enclosures of the states and their rates while an input is held, and the rates at its start.
     held: Vec<[Interval; 2]>,
     rate: Vec<f64>,
@@ -535,6 +546,11 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
             *out = [0.0; EXPANSION_ORDERS];
             out[0] = *x;
         }
+    }
+
+    fn reads(&self, state: usize) -> bool {
+        // What follows the states is no part of h.
+        self.work.borrow().reads.get(state).copied().unwrap_or(false)
     }
 
     fn value(&self, t: f64, x: &[f64]) -> f64 {

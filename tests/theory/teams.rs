@@ -150,7 +150,9 @@ impl Team {
         let distance = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]);
         let count = self.goals.len();
         let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| [i, j]));
-        let near = pairs.map(|[i, j]| (i, j, distance(place(i), place(j)))).find(|(.., d)| *d < self.apart - ROUND_OFF);
+        let near = pairs
+            .map(|[i, j]| (i, j, distance(place(i), place(j))))
+            .find(|(.., d)| *d < self.apart - ROUND_OFF);
         if let Some((i, j, d)) = near {
             return Some(format!("{i} and {j} are {d} m apart at {t}, {} m were promised", self.apart));
         }
@@ -218,7 +220,10 @@ fn teams_keep_apart_and_arrive() {
                 if k == 0 {
                     search.push(took);
                     if !assurance.is_assured() {
-                        println!("{count}/{run}: refused, {:?}, {:?} in {} s, {took:.1} s", assurance.failure, team.kind, team.deadline);
+                        println!(
+                            "{count}/{run}: refused, {:?}, {:?} in {} s, {took:.1} s",
+                            assurance.failure, team.kind, team.deadline
+                        );
                         break;
                     }
                     accepted += 1;

@@ -600,6 +600,8 @@ impl Parts {
             report: Report::new(slots.len()),
             search: Scratch::new(SharedPlants::of(&mut slots)),
             qp: qp::Workspace::new(),
+            #[cfg(feature = "plan")]
+            decided: None,
         };
         let rows = Rows {
             state_dim,

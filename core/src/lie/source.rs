@@ -113,6 +113,12 @@ pub trait Predict {
     /// Writes the expansion of every state, starting at `x`, under the held input `u`.
     fn path(&self, x: &[f64], u: &[f64], out: &mut [Expansion]);
 
+    /// Whether h at a given state depends on component `state` of it: false only where it certainly does not. The default is true.
+    fn reads(&self, state: usize) -> bool {
+        let _ = state;
+        true
+    }
+
     /// h at time `t` (s) and state `x`.
     fn value(&self, t: f64, x: &[f64]) -> f64;
 

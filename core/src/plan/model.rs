@@ -170,6 +170,10 @@ impl Model<'_> {
 pub(crate) fn slopes(h: &dyn Predict, t: f64, x: &[f64], out: &mut [f64]) {
     let mut moved = x.to_vec();
     for (i, slope) in out.iter_mut().enumerate() {
+        if !h.reads(i) {
+            *slope = 0.0;
+            continue;
+        }
         let size = TOLERANCES.difference * (1.0 + x[i].abs());
         let [above, below] = [size, -size].map(|by| {
             moved[i] = x[i] + by;

@@ -225,7 +225,13 @@ impl<'a> Planner<'a> {
         let longer = undated_longer.into_iter().filter(|_| !is_dated).map(|undated| (grids[0], undated));
         let slow = Some((slow_grid, undated)).filter(|_| is_dated && horizon.is_none());
         let most = if self.beside.is_some() { self.settings.beside_grids } else { usize::MAX };
-        let grids = grids.map(|grid| (grid, undated)).into_iter().chain(slow).chain(longer).take(most);
+        // Being early is no help with several visits, nor are a few long holds.
+        let visits = self.requirements.iter().filter(|r| r.from > t && r.until.is_finite()).count();
+        let helps = |((part, [before, _]), _): &((f64, [usize; 2]), usize)| {
+            visits < 2 || *part == 1.0 && *before > slow_grid.1[0]
+        };
+        let grids = grids.map(|grid| (grid, undated)).into_iter().chain(slow).chain(longer);
+        let grids = grids.filter(helps).take(most);
         for ((part, holds), undated) in grids {
             let sooner = |r: &Requirement<'a>| {
                 let margin = match r.is_limit {
@@ -336,10 +342,15 @@ impl<'a> Planner<'a> {
         rounds: &[(usize, u32)],
         ending: &Ending<'_>,
     ) -> Result<Plan, Option<(f64, Failure)>> {
-        let SearchSettings { worth, tightened, tightening, stuck: most_stuck, less, .. } = *self.settings;
+        let SearchSettings { worth, tightened, tightening, stuck: most_stuck, less, polishing, .. } =
+            *self.settings;
         let (mut checked, mut search): (Option<(f64, Failure)>, _) = (None, search.clone());
         // A few steps show which guesses lead somewhere.
-        for &(most, iterations) in rounds {
+        for (round, &(most, iterations)) in rounds.iter().chain([&polishing]).enumerate() {
+            let is_near = |d: &Descent| d.best.violation <= worth;
+            if round == rounds.len() && !descents.iter().any(is_near) {
+                break;
+            }
             // A guess supplied by the user is never dropped.
             let merit = |d: &Descent| (!d.is_wanted, d.best.merit);
             descents.sort_by(|a, b| {
@@ -402,7 +413,8 @@ impl<'a> Planner<'a> {
                     .get(k + 1)
                     .map_or(f64::INFINITY, |next| next - self.settings.on_node * (next - times[k]));
                 let slack = h - requirement.margin;
-                if requirement.from < next && times[k] < requirement.until && -slack / size > most {
+                let until = requirement.until + self.settings.on_node * (times[k] - times[k - 1]);
+                if requirement.from < next && times[k] <= until && -slack / size > most {
                     let (barrier, time) = (requirement.barrier, requirement.from.max(times[k]));
                     most = -slack / size;
                     failure = Some(Failure::Broken { barrier, time, slack });
@@ -414,7 +426,8 @@ impl<'a> Planner<'a> {
 
     /// The length of a hold in s, and the times at which inputs may change: samples only. `before` holds lead to the last
     /// deadline, `after` holds past it; or both together to the end of a plan with a horizon. Without a deadline a hold is
-    /// `undated` periods. The last sample before each deadline is a node. `None` if there are too many samples.
+    /// `undated` periods. The last sample before each deadline, and before the end of each requirement, is a node. `None` if there
+    /// are too many samples.
     fn grid(
         &self,
         t: f64,
@@ -423,13 +436,12 @@ impl<'a> Planner<'a> {
         horizon: Option<f64>,
     ) -> Option<(f64, Vec<f64>)> {
         // A deadline that is a whole number of periods stays one despite round-off.
-        let sample =
-            |r: &Requirement<'_>| ((r.from - t) / self.period + self.settings.on_node).max(0.0) as usize;
+        let sample = |at: f64| ((at - t) / self.period + self.settings.on_node).max(0.0) as usize;
+        let finite = |at: &f64| at.is_finite();
         let mut deadlines: Vec<usize> =
-            requirements.iter().filter(|r| r.from.is_finite()).map(sample).collect();
-        deadlines.sort_unstable();
-        deadlines.dedup();
-        let last = deadlines.last().copied().unwrap_or(0);
+            requirements.iter().map(|r| r.from).filter(finite).map(sample).collect();
+        let last = deadlines.iter().copied().max().unwrap_or(0);
+        let mut ends: Vec<usize> = requirements.iter().map(|r| r.until).filter(finite).map(sample).collect();
         // Past the actual last deadline, not the one used in the search.
         let past = horizon.map(|horizon| {
             let until = (self.last(t) + self.settings.ample * horizon)
@@ -445,6 +457,9 @@ impl<'a> Planner<'a> {
             None => undated,
         };
         let after = past.map_or(after, |past| past.div_ceil(hold));
+        deadlines.extend(ends.iter().copied().filter(|end| *end < last));
+        deadlines.sort_unstable();
+        deadlines.dedup();
         let (mut samples, mut from) = (vec![0], 0);
         for deadline in deadlines {
             let (length, holds) = (deadline - from, (deadline - from).div_ceil(hold));
@@ -452,6 +467,11 @@ impl<'a> Planner<'a> {
             from = deadline;
         }
         samples.extend((1..=after).map(|k| from + hold * k));
+        let end = from + hold * after;
+        ends.retain(|sample| *sample > last && *sample < end && !samples.contains(sample));
+        samples.extend(ends);
+        samples.sort_unstable();
+        samples.dedup();
         Some((hold as f64 * self.period, samples.into_iter().map(|k| t + k as f64 * self.period).collect()))
     }
 
@@ -865,7 +885,7 @@ impl<'a> Planner<'a> {
                     }));
                 }
             }
-        } else {
+        } else if nu <= self.settings.one_by_one {
             for i in 0..nu {
                 for side in [-1.0, 1.0] {
                     let mut s = vec![0.0; nu];
@@ -873,6 +893,20 @@ impl<'a> Planner<'a> {
                     sides.push(s);
                 }
             }
+        } else {
+            // Inputs of several vehicles: all to one side, by turns, or each to a side of its own.
+            for side in [-1.0, 1.0] {
+                sides.push(vec![side; nu]);
+                sides.extend(
+                    [0, 1].map(|odd| (0..nu).map(|i| if i % 2 == odd { side } else { 0.0 }).collect()),
+                );
+            }
+            let own = |pattern: u32| {
+                let bits =
+                    move |i: usize| (i as u32 + 1).wrapping_mul(pattern).wrapping_mul(2_654_435_761) >> 31;
+                (0..nu).map(|i| if bits(i) == 0 { -1.0 } else { 1.0 }).collect()
+            };
+            sides.extend([1, 3, 5, 7].map(own));
         }
         let (holds, last) = (times.len() - 1, self.last(times[0]));
         let run = move |side: &[f64], [size, part]: [f64; 2]| {

@@ -171,8 +171,9 @@ impl Search<'_> {
                     .times
                     .get(k + 1)
                     .map_or(f64::INFINITY, |next| next - self.settings().on_node * (next - t));
-                let begun = requirement.from < next && t < requirement.until;
-                if k > 0 && begun {
+                let before = if k > 0 { self.times[k - 1] } else { t };
+                let until = requirement.until + self.settings().on_node * (t - before);
+                if k > 0 && requirement.from < next && t <= until {
                     values.push((i, k, h - self.strictness * requirement.margin));
                 }
             }
@@ -478,26 +479,37 @@ impl Search<'_> {
         Some(Answer { inputs, states, prices, merit })
     }
 
-    /// The convex part of −∂²h/∂x², of requirement `i` at node `k`, by differences.
+    /// The convex part of −∂²h/∂x², of requirement `i` at node `k`, by differences: only of the states that h reads.
     fn curvature(&self, i: usize, k: usize, x: &[f64]) -> DMatrix<f64> {
-        let nx = x.len();
+        let (nx, model) = (x.len(), self.requirements[i].model);
+        let read: Vec<usize> = (0..nx).filter(|j| model.reads(*j)).collect();
         let (mut moved, mut ends) = (x.to_vec(), [vec![0.0; nx], vec![0.0; nx]]);
-        let mut bent = DMatrix::zeros(nx, nx);
-        for j in 0..nx {
+        let mut bent = DMatrix::zeros(read.len(), read.len());
+        for (c, &j) in read.iter().enumerate() {
             let size = if self.quick { 1e-3 } else { 1e-4 } * (1.0 + x[j].abs());
             for (end, sign) in ends.iter_mut().zip([size, -size]) {
                 moved[j] = x[j] + sign;
-                slopes(self.requirements[i].model, self.times[k], &moved, end);
+                slopes(model, self.times[k], &moved, end);
             }
             moved[j] = x[j];
-            for r in 0..nx {
-                bent[(r, j)] = (ends[1][r] - ends[0][r]) / (2.0 * size);
+            for (r, &of) in read.iter().enumerate() {
+                bent[(r, c)] = (ends[1][of] - ends[0][of]) / (2.0 * size);
             }
+        }
+        let mut convex = DMatrix::zeros(nx, nx);
+        if read.is_empty() {
+            return convex;
         }
         let symmetric = (&bent + bent.transpose()) * 0.5;
         let parts = symmetric.symmetric_eigen();
         let most = parts.eigenvalues.amax();
         let kept = parts.eigenvalues.map(|v| if v > 1e-4 * most { v } else { 0.0 });
-        &parts.eigenvectors * DMatrix::from_diagonal(&kept) * parts.eigenvectors.transpose()
+        let of_read = &parts.eigenvectors * DMatrix::from_diagonal(&kept) * parts.eigenvectors.transpose();
+        for (c, &j) in read.iter().enumerate() {
+            for (r, &of) in read.iter().enumerate() {
+                convex[(of, j)] = of_read[(r, c)];
+            }
+        }
+        convex
     }
 }

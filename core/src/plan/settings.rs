@@ -35,10 +35,14 @@ pub(crate) struct SearchSettings {
     // Guesses, and how far they are followed.
     /// First guesses: inputs as a part of their bounds, and the part of the time for which they are held.
     pub(crate) guesses: [[f64; 2]; 4],
+    /// Largest number of inputs of which a guess moves one at a time.
+    pub(crate) one_by_one: usize,
     /// Largest number of evaluations of a policy over a hold of the search, which uses their mean.
     pub(crate) asked: f64,
     /// Rounds of a search: the number of guesses that continue, nearest first, and the quadratic programs for each of them.
     pub(crate) rounds: [(usize, u32); 3],
+    /// One more round for the nearest guess, if it nearly does.
+    pub(crate) polishing: (usize, u32),
     /// The same for guesses that lead to an equilibrium within the sets.
     pub(crate) aimed_rounds: [(usize, u32); 2],
     /// The same for guesses near a plan that was found.
@@ -178,12 +182,16 @@ pub(crate) const SETTINGS: SearchSettings = SearchSettings {
     // To either side: for a third of the time, briefly, and as a nudge of two holds. The last is a hard turn, which no other
     // guess leads to (`a_hard_turn_is_found`). Each costs a rollout per side, and may displace others in `rounds`.
     guesses: [[0.4, 0.35], [0.6, 0.1], [0.5, 0.0], [1.0, 0.6]],
+    // Each guess is followed once, and a team of ten would have eighty of each size.
+    one_by_one: 8,
     // A limit of time: a policy may be slow, and a hold of the search has thousands of samples at short periods.
     asked: 16.0,
     // A few programs show which guesses lead somewhere, and only those get more. Up to 24 + 30 + 36 programs on each grid
     // are what a refusal costs. (14, 2), (5, 6), (3, 20) were tried together with two more grids, and given up with them:
     // refusals took too long.
     rounds: [(12, 2), (5, 6), (3, 12)],
+    // Several visits among obstacles converge slowly once they miss by millimetres. It only prolongs a search that has failed.
+    polishing: (1, 30),
     // Usually one of the two guesses is a plan as it is, so that few programs are needed.
     aimed_rounds: [(2, 2), (2, 6)],
     // There are three such guesses. The rounds were (3, 2), (1, 6) once, and were raised twice to find sooner deadlines

@@ -14,7 +14,8 @@ use crate::filter::AssuranceStatus;
 use crate::plan::{BackupPlan, Failure, Plan, Planner};
 
 /// The result of a first sample: what is promised, and by which plan.
-pub(super) struct First {
+#[derive(Clone)]
+pub(in crate::filter) struct First {
     pub(super) promises: Vec<Option<Promise>>,
     pub(super) plan: Plan,
     /// The barriers of the alternatives that are not taken.
@@ -168,7 +169,8 @@ impl Planning<'_> {
         plan
     }
 
-    /// The first plan for `asked`, or for what may be promised in its place.
+    /// The first plan for `asked`, or for what may be promised in its place. A search for other deadlines than those asked, with
+    /// nothing `shorter`, tries the best order of visits alone.
     pub(super) fn first(
         &self,
         asked: Vec<Option<Promise>>,
@@ -189,8 +191,10 @@ impl Planning<'_> {
                     Err(failure) => _ = nearest.get_or_insert(failure),
                 }
             }
-            for mut order in orders {
-                for _ in 0..=DECISIONS.repairs {
+            let [most, repairs] =
+                if shorter.is_empty() { [1, 0] } else { [orders.len(), DECISIONS.repairs as usize] };
+            for mut order in orders.into_iter().take(most) {
+                for _ in 0..=repairs {
                     let Some(promises) = self.at_times(&latest, &order, at.0) else { break };
                     let failure = match search(promises) {
                         Ok(first) => return Ok(First { let_go, ..first }),

@@ -43,6 +43,7 @@ pub use bears::{Bears, Remedy, UncertaintyKind};
 use choice::Piece;
 pub use first::Appraisal;
 pub use planning::Planning;
+pub(super) use sample::Decided;
 use sample::{At, Decision};
 use settings::DECISIONS;
 pub use state::PlanState;

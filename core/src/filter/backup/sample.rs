@@ -46,6 +46,33 @@ pub(super) struct At<'a> {
     pub(super) x: &'a [f64],
 }
 
+/// A very first sample and what was found for it. A master evaluates a sample again for another u_ref, and the search does not
+/// depend on that where every input has bounds.
+pub(in crate::filter) struct Decided {
+    asked: Asked,
+    found: Result<(f64, First), Failure>,
+}
+
+/// What a search at a very first sample depends on besides the filter.
+#[derive(PartialEq)]
+struct Asked {
+    at: [f64; 4],
+    x: Vec<f64>,
+}
+
+impl Asked {
+    /// `None` of other samples, and beside points: those searches depend on more.
+    fn of(planning: &Planning<'_>, At { t, hold, x }: At<'_>, u: &[f64]) -> Option<Self> {
+        let (Rows { state, .. }, before) = (planning.rows, planning.before());
+        let is_first = state.time.is_none() && state.start.is_none() && before.plan.is_empty();
+        let is_bounded =
+            (0..u.len()).all(|i| planning.bounds.min[i].is_finite() && planning.bounds.max[i].is_finite());
+        let (measured, of) = planning.measured?;
+        (is_first && is_bounded && planning.courses.is_empty())
+            .then(|| Self { at: [t, hold, measured, of.len() as f64], x: [x, of].concat() })
+    }
+}
+
 impl Decision<'_> {
     fn planning(&self) -> Planning<'_> {
         let Self { rows, integrator, plans, bounds, uncertainty, measured, states, courses, .. } = self;
@@ -152,11 +179,45 @@ impl Decision<'_> {
     /// Decides at the first sample what is promised, and whether a plan keeps it. If none does, the barriers that [accept a
     /// later deadline](Infeasible::Earliest) get the earliest one for which there is a plan. Returns whether the plan was
     /// made here.
-    fn decide(&mut self, At { t, hold, x }: At<'_>, u: &[f64]) -> bool {
+    fn decide(&mut self, at: At<'_>, u: &[f64]) -> bool {
+        let At { t, hold, x } = at;
+        let asked = Asked::of(&self.planning(), at, u);
+        let known =
+            self.rows.workspace.decided.take().filter(|decided| asked.as_ref() == Some(&decided.asked));
+        let found = known.map_or_else(|| self.found(at, u), |decided| decided.found);
+        self.rows.workspace.decided = asked.map(|asked| Decided { asked, found: found.clone() });
+        match found {
+            Ok((factor, First { promises, plan, let_go, is_old })) => {
+                self.let_go(&let_go);
+                let courses = self.planning().rests_on(t, &promises);
+                let next = self.next();
+                (next.promises, next.plan, next.courses) = (promises, plan, courses);
+                next.deviation = Deviation::from(t, x);
+                next.memory = ChoiceMemory::beside(&next.plan.backup_plan);
+                self.prolong_next(t);
+                self.end(AssuranceStatus::Assured, None);
+                self.postpone(t, hold, factor);
+                !is_old
+            }
+            Err(failure) => {
+                // The rows go for the first alternatives.
+                let others: Vec<usize> = self.planning().choices().next().unwrap_or_default();
+                let promises = self.planning().promises(t, x, |_| 1.0);
+                self.let_go(&others);
+                let next = self.next();
+                (next.promises, next.plan) = (promises, Plan::default());
+                self.end(AssuranceStatus::Refused, Some(failure));
+                true
+            }
+        }
+    }
+
+    /// What is promised at the first sample, with the factor on the deadlines that yield, and its plan.
+    fn found(&self, At { t, hold, x }: At<'_>, u: &[f64]) -> Result<(f64, First), Failure> {
         let planning = self.planning();
         let search = |promises, shorter: &[f64]| planning.first(promises, (t, hold), x, u, shorter);
         let promises = planning.promises(t, x, |_| 1.0);
-        let mut found = search(promises.clone(), &DECISIONS.shorter).map(|first| (1.0, first));
+        let mut found = search(promises, &DECISIONS.shorter).map(|first| (1.0, first));
         let yields = |slot: &BarrierSlot| slot.promise.settings().infeasible == Infeasible::Earliest;
         if found.is_err() && planning.rows.slots.iter().any(yields) {
             let promised =
@@ -177,32 +238,9 @@ impl Decision<'_> {
         }
         // Until its first input acts, a filter can only look on.
         let acting: Vec<_> = planning.rows.acting(self.measured.0).collect();
-        found = found.and_then(|(factor, first)| {
+        found.and_then(|(factor, first)| {
             planning.waits(&first.promises, self.measured, &acting).map(|()| (factor, first))
-        });
-        match found {
-            Ok((factor, First { promises, plan, let_go, is_old })) => {
-                self.let_go(&let_go);
-                let courses = self.planning().rests_on(t, &promises);
-                let next = self.next();
-                (next.promises, next.plan, next.courses) = (promises, plan, courses);
-                next.deviation = Deviation::from(t, x);
-                next.memory = ChoiceMemory::beside(&next.plan.backup_plan);
-                self.prolong_next(t);
-                self.end(AssuranceStatus::Assured, None);
-                self.postpone(t, hold, factor);
-                !is_old
-            }
-            Err(failure) => {
-                // The rows go for the first alternatives.
-                let others: Vec<usize> = self.planning().choices().next().unwrap_or_default();
-                self.let_go(&others);
-                let next = self.next();
-                (next.promises, next.plan) = (promises, Plan::default());
-                self.end(AssuranceStatus::Refused, Some(failure));
-                true
-            }
-        }
+        })
     }
 
     /// Lets the barriers of alternatives go that are not taken.

@@ -44,6 +44,9 @@ pub(super) struct Workspace {
     pub(super) report: Report,
     pub(super) search: Scratch,
     pub(super) qp: qp::Workspace,
+    /// What plans decided at the very first sample, in case that it is evaluated again.
+    #[cfg(feature = "plan")]
+    pub(super) decided: Option<super::backup::Decided>,
 }
 
 /// One row per barrier, and the QP under them: `min ½‖u − u_ref‖²` within the input bounds. State and input are those of the
