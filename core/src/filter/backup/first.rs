@@ -5,7 +5,7 @@ use core::cell::Cell;
 
 use super::bears::Bears;
 use super::planning::Planning;
-use super::schedule::Choice;
+use super::schedule::{Choice, Order};
 use super::settings::{DECISIONS, DecisionSettings};
 use super::state::Promise;
 use crate::MAX_INPUTS;
@@ -182,18 +182,43 @@ impl Planning<'_> {
         let Some(ways) = self.ways(&asked, at.0, x) else {
             return self.first_of(asked, at, x, u, shorter);
         };
-        let mut nearest = None;
+        let (mut nearest, mut waiting) = (None, Vec::new());
+        let search = |promises| self.first_of(promises, at, x, u, shorter);
+        // More time for what is not reached.
+        let repaired = |order: &Order, failure| match failure {
+            Failure::Broken { barrier, .. } => order.slower_to(barrier, at.0, self.plans.period),
+            _ => None,
+        };
+        // The best order of every way, before any is repaired.
         for Choice { latest, let_go, is_possible, orders } in ways {
-            let search = |promises| self.first_of(promises, at, x, u, shorter);
             if is_possible {
                 match search(latest.clone()) {
                     Ok(first) => return Ok(First { let_go, ..first }),
                     Err(failure) => _ = nearest.get_or_insert(failure),
                 }
             }
-            let [most, repairs] =
-                if shorter.is_empty() { [1, 0] } else { [orders.len(), DECISIONS.repairs as usize] };
-            for mut order in orders.into_iter().take(most) {
+            let mut orders = orders.into_iter();
+            let mut slower = None;
+            if let Some(order) = orders.next()
+                && let Some(promises) = self.at_times(&latest, &order, at.0)
+            {
+                match search(promises) {
+                    Ok(first) => return Ok(First { let_go, ..first }),
+                    Err(failure) => {
+                        nearest.get_or_insert(failure);
+                        slower = repaired(&order, failure);
+                    }
+                }
+            }
+            let repairs = DECISIONS.repairs;
+            let others = slower
+                .map(|order| (order, repairs - 1))
+                .into_iter()
+                .chain(orders.map(move |order| (order, repairs)));
+            waiting.push((latest, let_go, others));
+        }
+        for (latest, let_go, others) in waiting.into_iter().filter(|_| !shorter.is_empty()) {
+            for (mut order, repairs) in others {
                 for _ in 0..=repairs {
                     let Some(promises) = self.at_times(&latest, &order, at.0) else { break };
                     let failure = match search(promises) {
@@ -201,9 +226,7 @@ impl Planning<'_> {
                         Err(failure) => failure,
                     };
                     nearest.get_or_insert(failure);
-                    // More time for what is not reached.
-                    let Failure::Broken { barrier, .. } = failure else { break };
-                    let Some(slower) = order.slower_to(barrier, at.0, self.plans.period) else { break };
+                    let Some(slower) = repaired(&order, failure) else { break };
                     order = slower;
                 }
             }
