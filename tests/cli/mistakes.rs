@@ -86,7 +86,7 @@ const MISTAKES: [(&str, &str, &str, &str); 38] = [
         "unicycle-filter",
         "[45.0, 45.0]",
         "[45.0, 45.0, 0.0]",
-        "barrier[0].centre: has 3 entries, must have 2 (line 10)",
+        "barrier[0].centre: has 3 entries, must have 2, along x and y for disc",
     ),
     (
         "unicycle-filter",

@@ -119,12 +119,11 @@ def test_the_command_line_is_there(tmp_path):
 
 
 DECLARED = {
-    "actuation_delay": {"actuation_delay": 2 * STEP},
     "disturbance": {"barrier": [barrier | {"disturbance": 0.01} for barrier in ASSURED["barrier"]]},
 }
 
 
-@pytest.mark.parametrize("keys", [["actuation_delay"], ["disturbance"], ["actuation_delay", "disturbance"]])
+@pytest.mark.parametrize("keys", [["disturbance"]])
 def test_what_switches_plans_off_is_a_warning_once_for_each_that_is_made(keys, tmp_path):
     lost = ASSURED | {name: value for key in keys for name, value in DECLARED[key].items()}
     filter_fmu, plant_fmu = tmp_path / "filter.fmu", punctual.build(PLANT, tmp_path / "plant.fmu")

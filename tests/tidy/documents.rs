@@ -122,11 +122,12 @@ fn tables_of_keys(markdown: &str) -> Vec<BTreeSet<String>> {
 }
 
 /// Beginnings of files up to an unknown key, in the order of the tables of docs/configuration.md.
-const PLACES: [&str; 22] = [
+const PLACES: [&str; 23] = [
     "kind = \"filter\"",
     "kind = \"filter\"\n[uncertainty]",
     "kind = \"filter\"\n[uncertainty.inputs.a]",
     "kind = \"filter\"\n[[barrier]]",
+    "kind = \"filter\"\n[[agent]]",
     "kind = \"filter\"\n[plant]",
     "kind = \"filter\"\n[[plant.states]]",
     "kind = \"filter\"\n[[plant.parameters]]",

@@ -456,12 +456,12 @@ fn unknown_and_missing_keys_and_wrong_types() {
         (FILTER, "name = \"goal\"", "", "barrier[0].name: missing, it must be given (line 5)"),
         (FILTER, "plant = { model = \"unicycle\" }", "", "plant: missing, it must be given"),
         (FILTER, "radius = 2.0", "radius = \"2\"", "barrier[0].radius: is \"2\", must be a number (line 8)"),
-        (FILTER, "[45.0, 44.0]", "[45.0]", "barrier[0].centre: has 1 entry, must have 2 (line 7)"),
+        (FILTER, "[45.0, 44.0]", "[45.0]", "barrier[0].centre: has 1 entry, must have 2 or 3 (line 7)"),
         (
             FILTER,
             "[45.0, 44.0]",
             "[45.0, 44.0, 7.0]",
-            "barrier[0].centre: has 3 entries, must have 2 (line 7)",
+            "barrier[0].centre: has 3 entries, must have 2, along x and y for disc",
         ),
         (
             FILTER,
@@ -1014,7 +1014,7 @@ fn defaults_of_the_tables_are_those_of_the_files() {
 }
 
 /// A value of every key that only some shapes have.
-const SHAPE_VALUES: [(&str, &str); 17] = [
+const SHAPE_VALUES: [(&str, &str); 20] = [
     ("centre", "[1.0, 2.0]"),
     ("radius", "1.0"),
     ("half_axes", "[2.0, 1.0]"),
@@ -1032,17 +1032,49 @@ const SHAPE_VALUES: [(&str, &str); 17] = [
     ("velocity_error", "0.1"),
     ("angle", "0.5"),
     ("unit", "\"m\""),
+    ("position", "[\"x\", \"y\", \"z\"]"),
+    ("from", "[\"p\", \"q\", \"r\"]"),
+    ("distance", "1.0"),
 ];
+
+/// Whether a shape is for models without a name.
+fn is_for_own(row: &ShapeRow) -> bool {
+    ["sphere", "spherical_obstacle", "box", "box_obstacle", "apart"].contains(&row.name)
+}
+
+/// The line that gives `key` to a shape.
+fn line_of(row: &ShapeRow, key: &str) -> String {
+    let value = SHAPE_VALUES.iter().find(|v| v.0 == key).unwrap_or_else(|| panic!("no value of {key}")).1;
+    let in_space = is_for_own(row) && ["centre", "half_sides"].contains(&key);
+    format!("{key} = {}\n", if in_space { "[2.0, 1.0, 0.5]" } else { value })
+}
+
+/// A file up to the keys of a shape, with a plant that it is for.
+fn head_of(row: &ShapeRow) -> String {
+    let named =
+        |names: &str| names.split(' ').map(|name| format!("{{ name = \"{name}\" }}, ")).collect::<String>();
+    let plant = match is_for_own(row) {
+        false => "plant.model = \"unicycle\"".to_owned(),
+        true => format!(
+            "plant.states = [{}]\nplant.inputs = [{}]\n\
+             plant.derivatives = {{ x = \"u\", y = \"v\", z = \"w\", p = \"0\", q = \"0\", r = \"0\" }}",
+            named("x y z p q r"),
+            named("u v w")
+        ),
+    };
+    let name = row.name;
+    format!(
+        "kind = \"filter\"\n{plant}\nsampling = \"pointwise\"\n[[barrier]]\nname = \"b\"\nshape = \"{name}\"\n"
+    )
+}
 
 /// A file with each shape, named b, with the keys that it needs.
 fn every_shape() -> Vec<(String, &'static ShapeRow)> {
-    let value = |key: &str| SHAPE_VALUES.iter().find(|v| v.0 == key).map_or("", |v| v.1);
     // A plug-in has to exist.
     let rows = SHAPES.iter().filter(|row| row.name != "plugin");
     rows.map(|row| {
-        let keys: String = row.required.iter().map(|key| format!("{key} = {}\n", value(key))).collect();
-        let head = "kind = \"filter\"\nplant.model = \"unicycle\"\nsampling = \"pointwise\"\n[[barrier]]\nname = \"b\"\n";
-        (format!("{head}shape = \"{}\"\n{keys}", row.name), row)
+        let keys: String = row.required.iter().map(|key| line_of(row, key)).collect();
+        (head_of(row) + &keys, row)
     })
     .collect()
 }
@@ -1050,17 +1082,13 @@ fn every_shape() -> Vec<(String, &'static ShapeRow)> {
 /// The keys that a shape needs by its row in the table are enough, and none is too many.
 #[test]
 fn shapes_need_what_their_row_says() {
-    let values = SHAPE_VALUES;
-    let line = |key: &&str| {
-        let value = values.iter().find(|v| v.0 == *key).unwrap_or_else(|| panic!("no value of {key}"));
-        format!("{key} = {}\n", value.1)
-    };
-    let head = "kind = \"filter\"\nplant.model = \"unicycle\"\nsampling = \"pointwise\"\n[[barrier]]\nname = \"b\"\n";
     // A plug-in has to exist, which tests/cli sees to.
     for row in SHAPES.iter().filter(|row| row.name != "plugin") {
+        let (head, line) = (head_of(row), |key: &&str| line_of(row, key));
         let needed: String = row.required.iter().map(line).collect();
-        let head = format!("{head}shape = \"{}\"\n", row.name);
-        for text in [needed.clone(), needed.clone() + &row.optional.iter().map(line).collect::<String>()] {
+        // The position of a vehicle with a name is its own.
+        let optional = row.optional.iter().filter(|key| is_for_own(row) || **key != "position");
+        for text in [needed.clone(), needed.clone() + &optional.map(line).collect::<String>()] {
             let Configuration::Filter(c) = Configuration::parse(&(head.clone() + &text))
                 .unwrap_or_else(|e| panic!("{e} in {head}{text}"))
             else {
@@ -1074,7 +1102,7 @@ fn shapes_need_what_their_row_says() {
         }
         // A key of another shape is no key of this one.
         let known = |key: &str| row.required.contains(&key) || row.optional.contains(&key);
-        for (key, _) in values.iter().filter(|(key, _)| !known(key)) {
+        for (key, _) in SHAPE_VALUES.iter().filter(|(key, _)| !known(key)) {
             let text = format!("{head}{needed}{}", line(key));
             let error = Configuration::parse(&text).map(|_| text.clone()).unwrap_err();
             assert_eq!(error.field(), format!("barrier[0].{key}"), "{error}");
@@ -1088,8 +1116,10 @@ fn the_numbers_of_shapes_are_parameters() {
     for (kind, row) in every_shape() {
         let Configuration::Filter(c) = Configuration::parse(&kind).unwrap() else { panic!("not a filter") };
         let names: BTreeSet<_> = c.parameters().into_iter().map(|row| row.name).collect();
-        let numbers =
-            row.required.iter().filter(|key| !["state", "expression", "relative_degree"].contains(key));
+        let numbers = row
+            .required
+            .iter()
+            .filter(|key| !["state", "expression", "relative_degree", "from"].contains(key));
         for key in numbers {
             let (one, first) = (format!("b.{key}"), format!("b.{key}[1]"));
             assert!(names.contains(&one) || names.contains(&first), "{} of {}: {names:?}", key, row.name);

@@ -36,7 +36,7 @@ pub enum Shape {
         at: Point,
         radius: f64,
     },
-    /// [`Outside`] of a [`DistanceDisc`].
+    /// What is [outside](punctual_core::barriers::Outside) of a [`DistanceDisc`].
     Obstacle {
         #[serde(flatten)]
         at: Point,
@@ -45,11 +45,11 @@ pub enum Shape {
     },
     /// [`Ellipse`].
     Ellipse { centre: [f64; 2], half_axes: [f64; 2], angle: f64 },
-    /// [`Outside`] of an [`Ellipse`].
+    /// What is [outside](punctual_core::barriers::Outside) of an [`Ellipse`].
     EllipticObstacle { centre: [f64; 2], half_axes: [f64; 2], angle: f64 },
     /// [`Rectangle`].
     Rectangle { centre: [f64; 2], half_sides: [f64; 2], angle: f64 },
-    /// [`Outside`] of a [`Rectangle`] that contains the true one.
+    /// What is [outside](punctual_core::barriers::Outside) of a [`Rectangle`] that contains the true one.
     RectangularObstacle { centre: [f64; 2], half_sides: [f64; 2], angle: f64 },
     /// A [`DistanceDisc`] in space.
     Sphere { centre: [f64; 3], radius: f64, smoothing: Automatic },

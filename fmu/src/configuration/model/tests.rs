@@ -160,7 +160,7 @@ fn defects() {
         (
             "expression = \"p - d\"",
             "shape = \"disc\"\nexpression = \"p - d\"",
-            "barrier[0].shape: is \"disc\", which is for the plants that have a name; give an `expression`",
+            "barrier[0].centre: missing, disc needs it",
         ),
     ] {
         assert_eq!(refusal(CAR, from, to), wanted, "{to}");

@@ -142,7 +142,7 @@ fn what_is_no_team_is_refused() {
         (
             "blue_a = [-2.0, 1.0]",
             "green_a = [-2.0, 1.0]",
-            "bounds.green_a: unknown input; did you mean red_a?",
+            "bounds.green_a: unknown input (did you mean red_a?)",
         ),
     ] {
         let refused = refusal(&TEAM.replacen(from, to, 1));
@@ -243,7 +243,7 @@ fn spheres_and_boxes_are_in_space() {
             "centre = [1.0, 2.0, 3.0]\nradius = 2.0",
             "barrier[0].centre: has 3 entries, must have 2, along x and y for disc",
         ),
-        ("centre = [1.0]\nradius = 2.0", "barrier[0].centre: has 1 entry, must have 2 or 3 (line 7)"),
+        ("centre = [1.0]\nradius = 2.0", "barrier[0].centre: has 1 entry, must have 2 or 3 (line 8)"),
         (
             "position = [\"x\", \"q\"]\ncentre = [1.0, 2.0]\nradius = 2.0",
             "barrier[0].position: has \"q\", which is no state, must be of x, y, z",
