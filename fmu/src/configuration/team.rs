@@ -96,7 +96,7 @@ impl RawFilter {
         }
         let team = Team { model: std::mem::take(&mut self.plant).own()?, agents };
         team.check()?;
-        self.barrier = team.barriers(self.barrier, self.keep_apart.take())?;
+        self.barrier = team.barriers(&self.barrier, self.keep_apart.take())?;
         self.plant = team.joint_model();
         team.spread(&mut self.bounds, |_, bounds| *bounds);
         team.spread(&mut self.measurement_errors, |_, error| *error);
@@ -231,7 +231,7 @@ impl Team {
     /// The barriers of all: each table for one agent or for all of them, or as it is where it is about several; and the distances.
     fn barriers(
         &self,
-        tables: Vec<RawBarrier>,
+        tables: &[RawBarrier],
         keep_apart: Option<f64>,
     ) -> Result<Vec<RawBarrier>, ConfigurationError> {
         let mut barriers = Vec::new();
@@ -243,12 +243,12 @@ impl Team {
                         let message = format!("is {name:?}, must be one of {}", names.join(", "));
                         return refuse(format!("barrier[{i}].agent"), message);
                     };
-                    barriers.push(self.barrier(agent, table, &tables, i)?);
+                    barriers.push(self.barrier(agent, table, tables, i)?);
                 }
                 None if self.is_joint(table) => barriers.push(table.clone()),
                 None => {
                     for agent in &self.agents {
-                        barriers.push(self.barrier(agent, table, &tables, i)?);
+                        barriers.push(self.barrier(agent, table, tables, i)?);
                     }
                 }
             }

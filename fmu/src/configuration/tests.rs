@@ -473,7 +473,7 @@ fn unknown_and_missing_keys_and_wrong_types() {
             FILTER,
             "[45.0, 44.0]",
             "45.0",
-            "barrier[0].centre: is 45.0, must be a list with 2 entries (line 7)",
+            "barrier[0].centre: is 45.0, must be a list with 2 or 3 entries (line 7)",
         ),
         (FILTER, "[-9.0, 8.0]", "[-9.0, 8.0, 7.0]", "bounds.a: has 3 entries, must have 2 (line 4)"),
         (FILTER, "[-9.0, 8.0]", "8.0", "bounds.a: is 8.0, must be a list with 2 entries (line 4)"),
