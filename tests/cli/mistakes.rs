@@ -115,9 +115,10 @@ const MISTAKES: [(&str, &str, &str, &str); 38] = [
     (
         "unicycle-filter",
         "name = \"goal\"",
-        "name = \"goal\"\nshape = \"box\"",
-        "barrier[0].shape: is \"box\", must be \"disc\", \"quadratic_disc\", \"obstacle\", \"ellipse\", \
-         \"elliptic_obstacle\", \"rectangle\", \"rectangular_obstacle\", \"half_plane\", \"at_most\", \"at_least\", \
+        "name = \"goal\"\nshape = \"cube\"",
+        "barrier[0].shape: is \"cube\", must be \"disc\", \"quadratic_disc\", \"obstacle\", \"ellipse\", \
+         \"elliptic_obstacle\", \"rectangle\", \"rectangular_obstacle\", \"sphere\", \"spherical_obstacle\", \"box\", \"box_obstacle\", \"apart\", \
+         \"half_plane\", \"at_most\", \"at_least\", \
          \"speed_limit\", \"expression\", \"plugin\" or \"external\" (line 10)",
     ),
     (
