@@ -227,7 +227,9 @@ impl BackupPlanReport {
                 let until = self.until().map(|until| {
                     format!(", until {} s; it is extended if a longer one is found", number_below(until))
                 });
-                let keeps = "found; within the bounds, it keeps every promise, whatever u_ref is";
+                // What is not promised is named below.
+                let kept = if self.left_out.is_empty() { "every promise" } else { "what is promised" };
+                let keeps = format!("found; within the bounds, it keeps {kept}, whatever u_ref is");
                 format!("\nbackup plan: {keeps}{}", until.unwrap_or_default())
             }
             (false, Some(reason)) if self.vain => format!("\nbackup plan: NONE can exist: {reason}"),

@@ -48,3 +48,45 @@ fn missions_are_promised_and_done() {
         "{refused:#?}"
     );
 }
+
+/// What a mission keeps at all times is not promised to who starts outside of it, and `check` says that and fails.
+#[test]
+fn a_start_where_a_mission_forbids_it_is_named() {
+    let workshop = Workshop::new();
+    let text = file("F[0,20] A & G !home", "");
+    workshop.write("tour.toml", text);
+    let check = workshop.punctual(["check", "tour.toml"]);
+    assert_eq!(check.code, 1, "{check:#?}");
+    for line in [
+        "backup plan: found; within the bounds, it keeps what is promised, whatever u_ref is",
+        "not promised from there, and not in the plan: home",
+        "warning: home: outside at the start and without a deadline: nothing is promised; give it a deadline",
+    ] {
+        assert!(check.stdout.contains(line) || check.stderr.contains(line), "{line}: {check:#?}");
+    }
+}
+
+/// A mission of a team, in the names of its members, with the distance between them.
+#[test]
+fn a_team_does_its_mission() {
+    let workshop = Workshop::new();
+    let agents = "[[agent]]\nname = \"red\"\n[[agent]]\nname = \"blue\"\nx0 = { x_p = 8.0 }\n";
+    let places = "[[barrier]]\nname = \"A\"\ncentre = [8.0, 0.0]\nradius = 1.0\n[[barrier]]\nname = \"B\"\ncentre = [0.0, 0.0]\nradius = 1.0\n";
+    workshop.write(
+        "team.toml",
+        format!(
+            "kind = \"filter\"\nmission = \"F[0,12] red_A & F[0,14] blue_B\"\nplant.model = \"point_mass\"\nkeep_apart = 1.5\n\
+             u_ref = {{ u_x = \"-v_x\", u_y = \"-v_y\" }}\nbounds = {{ u_x = [-2.0, 2.0], u_y = [-2.0, 2.0] }}\n\
+             experiment = {{ stop_time = 15.0, step_size = 0.05 }}\n{agents}{}",
+            places.replace("name = \"A\"", "name = \"A\"\nagent = \"red\"").replace("name = \"B\"", "name = \"B\"\nagent = \"blue\"")
+        ),
+    );
+    let run = workshop.punctual(["run", "team.toml", "--require", "guaranteed", "--json", "--report"]);
+    let report: Value = serde_json::from_str(&run.success()).expect("JSON");
+    let promises = report["promises"].as_array().expect("a list");
+    let names: Vec<&str> = promises.iter().filter_map(|promise| promise["barrier"].as_str()).collect();
+    assert_eq!(names, ["filter.red_A", "filter.blue_B", "filter.apart_red_blue"]);
+    // The page moves each of them.
+    let page = workshop.text("team/team.html");
+    assert!(["\"label\":\"red\"", "\"label\":\"blue\""].iter().all(|label| page.contains(label)));
+}

@@ -118,12 +118,14 @@ def test_the_command_line_is_there(tmp_path):
         punctual.run_cli("--none")
 
 
+# Plans account for a delay of up to 250 steps.
 DECLARED = {
+    "actuation_delay": {"actuation_delay": 251 * STEP},
     "disturbance": {"barrier": [barrier | {"disturbance": 0.01} for barrier in ASSURED["barrier"]]},
 }
 
 
-@pytest.mark.parametrize("keys", [["disturbance"]])
+@pytest.mark.parametrize("keys", [["actuation_delay"], ["disturbance"], ["actuation_delay", "disturbance"]])
 def test_what_switches_plans_off_is_a_warning_once_for_each_that_is_made(keys, tmp_path):
     lost = ASSURED | {name: value for key in keys for name, value in DECLARED[key].items()}
     filter_fmu, plant_fmu = tmp_path / "filter.fmu", punctual.build(PLANT, tmp_path / "plant.fmu")
@@ -149,7 +151,7 @@ def test_what_switches_plans_off_is_a_warning_once_for_each_that_is_made(keys, t
         with pytest.raises(punctual.GuaranteeWarning):
             punctual.Filter(lost)
         own = punctual.Filter(lost | {"assurance": "off"})
-        for configuration in (FILTER, ASSURED):
+        for configuration in (FILTER, ASSURED, ASSURED | {"actuation_delay": 2 * STEP}):
             punctual.Filter(configuration)
         copy.copy(own), pickle.loads(pickle.dumps(own))
     with pytest.raises(punctual.Error, match="assurance: is .on., must be"):
