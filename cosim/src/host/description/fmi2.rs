@@ -12,6 +12,7 @@
 
 use std::collections::HashMap;
 use std::ops::Deref;
+use std::sync::{Mutex, PoisonError};
 
 use fmi_rs::model_description::fmi2 as importer;
 use punctual_modeldescription::{
@@ -80,10 +81,14 @@ impl Fmi2Description {
     }
 }
 
+/// `fmi-rs` judges names with a parser in C whose state is global: one thread at a time.
+static JUDGE: Mutex<()> = Mutex::new(());
+
 /// The violations that `fmi-rs` finds.
 fn judged(root: Node<'_, '_>) -> Result<Vec<String>, FmuProblem> {
     let read =
         importer::ModelDescription::from_node(&root).map_err(|e| FmuProblem::Description(e.to_string()))?;
+    let _alone = JUDGE.lock().unwrap_or_else(PoisonError::into_inner);
     Ok(read.validate().into_iter().map(|problem| problem.message).collect())
 }
 
@@ -173,6 +178,26 @@ mod tests {
             <ScalarVariable name="l" valueReference="10"><Real declaredType="L" max="5"/></ScalarVariable>
             </ModelVariables><ModelStructure><Outputs>{outputs}</Outputs></ModelStructure></fmiModelDescription>"#
         )
+    }
+
+    /// The parser of `fmi-rs` would crash here without its lock.
+    #[test]
+    fn descriptions_are_read_on_several_threads() {
+        let text = xml(r#"<CoSimulation modelIdentifier="m"/>"#, "");
+        let text = text.replace("guid=", r#"variableNamingConvention="structured" guid="#);
+        let text = text.replace(r#"name="u""#, r#"name="pump[1].""#);
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| {
+                    let document = Document::parse(&text).unwrap();
+                    for _ in 0..500 {
+                        let problems = Fmi2Description::read(&document).unwrap().problems;
+                        let named = problems.iter().filter(|problem| problem.contains("'pump[1].'"));
+                        assert_eq!(named.count(), 1, "{problems:?}");
+                    }
+                });
+            }
+        });
     }
 
     #[test]
