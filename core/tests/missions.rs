@@ -2,9 +2,12 @@
 //!
 //! The judge moves the vehicle by an integrator of its own, and reads a mission as signal temporal logic: a visit is an instant in
 //! its window, what is kept is kept at every instant that it looks at, between samples too. More missions:
-//! `PUNCTUAL_MISSIONS=1000 cargo test --release -p punctual-core --test all -- --nocapture missions::`.
+//! `PUNCTUAL_MISSIONS=1000 cargo test --release -p punctual-core --test all -- --nocapture missions::`. With `PUNCTUAL_ORACLE` they
+//! are also written to that file, for `tests/oracle/missions.py`, and no run goes on past its first sample.
 
 #![allow(clippy::print_stdout, reason = "the figures are wanted")]
+
+use serde_json::json;
 
 use crate::uncertain;
 
@@ -153,6 +156,28 @@ impl Mission {
         filter.and_then(|filter| filter.with_plans(plans)).expect("a filter with plans")
     }
 
+    /// The mission for an optimiser.
+    fn case(&self, is_point: bool, accepted: bool) -> serde_json::Value {
+        let part = |part: &Part| {
+            let of = |kind: &str, place: &Disc, window: [f64; 2], stay: f64, until: Option<usize>| {
+                json!({
+                    "kind": kind, "centre": place.centre, "radius": place.radius, "window": window, "stay": stay,
+                    "until": until,
+                })
+            };
+            match part {
+                Part::Visit { place, window, stay } => of("visit", place, *window, *stay, None),
+                Part::Reach { place, window } => of("reach", place, *window, 0.0, None),
+                Part::Avoid { place, window } => of("avoid", place, *window, 0.0, None),
+                Part::Closed { place, until } => of("closed", place, [0.0, f64::INFINITY], 0.0, Some(*until)),
+            }
+        };
+        json!({
+            "is_point": is_point, "accepted": accepted, "start": self.x, "bounds": self.bounds, "end": self.end,
+            "order": self.order, "one_of": self.one_of, "parts": self.parts.iter().map(part).collect::<Vec<_>>(),
+        })
+    }
+
     /// The ends of its windows, which a judge must not miss.
     fn ends(&self) -> impl Iterator<Item = f64> {
         self.parts.iter().flat_map(|part| match *part {
@@ -257,6 +282,7 @@ fn missions_are_done_once_promised() {
     let missions = std::env::var("PUNCTUAL_MISSIONS").map_or(6, |count| count.parse().unwrap());
     let seed = std::env::var("PUNCTUAL_SEED").map_or(1, |seed| seed.parse().unwrap());
     let (mut accepted, mut broken) = (0, Vec::new());
+    let (oracle, mut cases) = (std::env::var_os("PUNCTUAL_ORACLE"), Vec::new());
     let mut search = Vec::new();
     for run in 0..missions {
         let mut draws = Draws(1000 * seed + run);
@@ -274,6 +300,7 @@ fn missions_are_done_once_promised() {
             let assurance = report.assurance.expect("plans");
             if k == 0 {
                 search.push(began.elapsed().as_secs_f64());
+                cases.push(mission.case(is_point, assurance.is_assured()));
                 if !assurance.is_assured() {
                     println!(
                         "{run}: refused, {:?}, {:?}, {:?}, {:?}",
@@ -282,6 +309,9 @@ fn missions_are_done_once_promised() {
                     break;
                 }
                 accepted += 1;
+                if oracle.is_some() {
+                    break;
+                }
             } else if !assurance.is_assured() {
                 broken.push(format!("{run}: lost at {t}, {assurance:?}"));
                 break;
@@ -296,6 +326,10 @@ fn missions_are_done_once_promised() {
                 broken.extend(mission.flaw(&seen).map(|flaw| format!("{run}: {flaw}, {:?}", mission.parts)));
             }
         }
+    }
+    if let Some(path) = oracle {
+        let text = serde_json::to_string(&cases).expect("JSON");
+        std::fs::write(path, text).expect("a file");
     }
     search.sort_by(f64::total_cmp);
     println!(

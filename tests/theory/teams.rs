@@ -259,3 +259,15 @@ fn teams_keep_apart_and_arrive() {
     println!("{} broken", broken.len());
     assert!(broken.is_empty(), "{broken:#?}");
 }
+
+/// The search needs no policy for robots that all meet in the middle.
+#[test]
+fn ten_robots_swap_places() {
+    let file = include_str!("../../examples/models/swarm.toml");
+    let Ok(Configuration::Filter(configuration)) = Configuration::parse(file) else { panic!("no filter") };
+    let mut filter = configuration.build_loop().expect("a filter");
+    let on_circle = |i: u32| f64::from(i) * std::f64::consts::PI / 5.0;
+    let x: Vec<f64> = (0..10).flat_map(|i| [on_circle(i).cos(), on_circle(i).sin()]).collect();
+    let report = filter.step(0.0, &x, &[0.0; 20], &mut [0.0; 20]).expect("right dimensions");
+    assert!(report.assurance.expect("plans").is_assured(), "{:?}", report.assurance);
+}

@@ -47,6 +47,12 @@ impl Guide {
     }
 }
 
+/// The side, -1 or 1, to which a `pattern` moves input `i`.
+fn side(i: usize, pattern: u32) -> f64 {
+    let bit = (i as u32 + 1).wrapping_mul(pattern).wrapping_mul(2_654_435_761) >> 31;
+    if bit == 0 { -1.0 } else { 1.0 }
+}
+
 /// How plans end: at an equilibrium under a law, if there is one.
 struct Ending<'a> {
     model: Model<'a>,
@@ -292,20 +298,22 @@ impl<'a> Planner<'a> {
                 let held = |hold: &[f64]| before.mean(hold[0], hold[1])[..self.dims[1]].to_vec();
                 let mut inputs: Vec<Vec<f64>> = times.windows(2).map(held).collect();
                 inputs.push(guide.equilibrium_input(&sketch));
-                if let Ok(plan) = self.descend(&search, vec![begin(inputs)], &self.settings.rounds, &ending) {
+                if let Ok(plan) =
+                    self.descend(&search, &mut vec![begin(inputs)], &self.settings.rounds, &ending)
+                {
                     return Ok(plan);
                 }
             }
             if let Some((plan, factor)) = self.beside {
                 let guesses = self.stretched(&sketch, plan, factor, &guide, &times).map(begin);
-                match self.descend(&search, guesses.into(), &self.settings.beside_rounds, &ending) {
+                match self.descend(&search, &mut guesses.into(), &self.settings.beside_rounds, &ending) {
                     Ok(plan) => return Ok(plan),
                     Err(_) => continue,
                 }
             }
             let lead = || {
                 let aimed = aim.iter().flat_map(|aim| self.aimed(&sketch, aim, x, &times));
-                self.descend(&search, aimed.map(begin).collect(), &self.settings.aimed_rounds, &ending)
+                self.descend(&search, &mut aimed.map(begin).collect(), &self.settings.aimed_rounds, &ending)
             };
             // A plant with isolated equilibria is led to one of them at once, unless there is a policy.
             let leads_first = self.policies.is_empty()
@@ -314,10 +322,23 @@ impl<'a> Planner<'a> {
                 return Ok(plan);
             }
             let policies = self.policies.iter().map(|policy| self.follow(&sketch, policy, &guide, x, &times));
-            let mut descents: Vec<Descent> =
-                policies.chain(self.guesses(&sketch, &guide, x, &times)).map(begin).collect();
+            let mut guesses = policies.chain(self.guesses(&sketch, &guide, x, &times)).map(begin);
+            let mut descents = Vec::new();
+            if search.is_of_many() {
+                descents.extend(guesses.next());
+                if let Ok(plan) = self.descend(&search, &mut descents, &self.settings.alone, &ending) {
+                    return Ok(plan);
+                }
+                let begun = self.guesses(&sketch, &guide, x, &times).next().unwrap_or_default();
+                let mut passing: Vec<Descent> = self.passing(&search, begun).map(begin).collect();
+                if let Ok(plan) = self.descend(&search, &mut passing, &self.settings.passed, &ending) {
+                    return Ok(plan);
+                }
+                descents.extend(passing);
+            }
+            descents.extend(guesses);
             descents.iter_mut().take(self.policies.len()).for_each(|descent| descent.is_wanted = true);
-            let found = self.descend(&search, descents, &self.settings.rounds, &ending);
+            let found = self.descend(&search, &mut descents, &self.settings.rounds, &ending);
             let found = found.or_else(|failure| match leads_first {
                 true => Err(failure),
                 false => lead().map_err(|_| failure),
@@ -337,14 +358,14 @@ impl<'a> Planner<'a> {
     /// failure.
     fn descend(
         &self,
-        search: &Search<'_>,
-        mut descents: Vec<Descent>,
+        given: &Search<'_>,
+        descents: &mut Vec<Descent>,
         rounds: &[(usize, u32)],
         ending: &Ending<'_>,
     ) -> Result<Plan, Option<(f64, Failure)>> {
         let SearchSettings { worth, tightened, tightening, stuck: most_stuck, less, polishing, .. } =
             *self.settings;
-        let (mut checked, mut search): (Option<(f64, Failure)>, _) = (None, search.clone());
+        let (mut checked, mut search): (Option<(f64, Failure)>, _) = (None, given.clone());
         // A few steps show which guesses lead somewhere.
         for (round, &(most, iterations)) in rounds.iter().chain([&polishing]).enumerate() {
             let is_near = |d: &Descent| d.best.violation <= worth;
@@ -359,7 +380,7 @@ impl<'a> Planner<'a> {
             });
             descents.truncate(most);
             let mut nearest = f64::INFINITY;
-            for descent in &mut descents {
+            for descent in descents.iter_mut() {
                 search.improve(descent, iterations);
                 let violation = descent.best.violation;
                 if violation > worth && violation >= nearest {
@@ -381,12 +402,18 @@ impl<'a> Planner<'a> {
                         Failure::Broken { barrier, slack, .. }
                             if descent.best.violation <= worth && stuck < most_stuck =>
                         {
-                            stuck = if -slack > less * least { stuck + 1 } else { 0 };
-                            least = least.min(-slack);
-                            search.tighten(barrier, slack, &descent.best);
-                            let wanted = descent.is_wanted;
-                            *descent = search.descent(descent.best.inputs.clone());
-                            descent.is_wanted = wanted;
+                            // Of many vehicles, all that are too near are told at once.
+                            let mut short = match search.is_of_many() {
+                                true => search.tighten_between(given, &descent.best),
+                                false => 0.0,
+                            };
+                            if short == 0.0 {
+                                short = -slack;
+                                search.tighten(barrier, slack, &descent.best);
+                            }
+                            stuck = if short > less * least { stuck + 1 } else { 0 };
+                            least = least.min(short);
+                            search.again(descent);
                             search.improve(descent, tightening);
                         }
                         _ => break,
@@ -864,6 +891,33 @@ impl<'a> Planner<'a> {
         })
     }
 
+    /// Guesses for several vehicles that are in one another's way: each goes its own way as if it were alone, and then all are
+    /// pushed to sides of their own.
+    fn passing(&self, search: &Search<'a>, begun: Vec<Vec<f64>>) -> impl Iterator<Item = Vec<Vec<f64>>> {
+        let SearchSettings { unhindered, pushes, pushed, .. } = *self.settings;
+        let (t, model) = (search.times[0], search.model);
+        let goals: Vec<Requirement<'a>> =
+            search.requirements.iter().copied().filter(|r| r.from > t).collect();
+        let sizes = vec![0.0; goals.len()];
+        let free = Search { requirements: goals, sizes, ..search.clone() };
+        let mut descent = free.descent(begun);
+        free.improve(&mut descent, unhindered);
+        let inputs = descent.best.inputs;
+        let (holds, size) = (inputs.len() - 1, self.size);
+        (1..=pushes).map(move |pattern| {
+            let mut inputs = inputs.clone();
+            for (k, u) in inputs[..holds].iter_mut().enumerate() {
+                // There and back again.
+                let phase = 2.0 * core::f64::consts::PI * k as f64 / holds as f64;
+                for (i, input) in u.iter_mut().enumerate() {
+                    *input += pushed * side(i, pattern) * model.reach(i, size) * elementary::sin(phase);
+                }
+                model.clamp(u);
+            }
+            inputs
+        })
+    }
+
     /// First guesses: the plant is stopped at once, or after inputs to either side.
     fn guesses(
         &self,
@@ -901,12 +955,7 @@ impl<'a> Planner<'a> {
                     [0, 1].map(|odd| (0..nu).map(|i| if i % 2 == odd { side } else { 0.0 }).collect()),
                 );
             }
-            let own = |pattern: u32| {
-                let bits =
-                    move |i: usize| (i as u32 + 1).wrapping_mul(pattern).wrapping_mul(2_654_435_761) >> 31;
-                (0..nu).map(|i| if bits(i) == 0 { -1.0 } else { 1.0 }).collect()
-            };
-            sides.extend([1, 3, 5, 7].map(own));
+            sides.extend([1, 3, 5, 7].map(|pattern| (0..nu).map(|i| side(i, pattern)).collect()));
         }
         let (holds, last) = (times.len() - 1, self.last(times[0]));
         let run = move |side: &[f64], [size, part]: [f64; 2]| {

@@ -108,6 +108,29 @@ impl Search<'_> {
         }
     }
 
+    /// Asks for more margin of everything that `near` falls short of between its nodes, where `given` is the search before
+    /// anything was asked for. Returns by how much all of it falls short: 0 if nothing does.
+    pub(super) fn tighten_between(&mut self, given: &Self, near: &Trajectory) -> f64 {
+        let SearchSettings { tighter, between, .. } = *self.settings();
+        let mut least = vec![0.0_f64; self.requirements.len()];
+        for (k, u) in near.inputs[..near.inputs.len() - 1].iter().enumerate() {
+            let (mut x, part) = (near.states[k].clone(), self.hold(k) / f64::from(between));
+            for step in 1..between {
+                self.model.flow(&mut x, u, part);
+                let t = self.times[k] + f64::from(step) * part;
+                for (least, r) in least.iter_mut().zip(&given.requirements) {
+                    if r.from < t && t <= r.until {
+                        *least = least.min(r.model.value(t, &x) - r.margin);
+                    }
+                }
+            }
+        }
+        for (requirement, least) in self.requirements.iter_mut().zip(&least) {
+            requirement.margin -= tighter * least / self.strictness;
+        }
+        -least.iter().sum::<f64>()
+    }
+
     /// The length of hold `k` in s.
     fn hold(&self, k: usize) -> f64 {
         self.times[k + 1] - self.times[k]
@@ -121,6 +144,11 @@ impl Search<'_> {
         self.model.settings
     }
 
+    /// Whether it has more inputs than one vehicle in the plane.
+    pub(super) fn is_of_many(&self) -> bool {
+        self.model.inputs() > self.settings().at_once
+    }
+
     /// The descent that begins with the trajectory under `inputs`, of which the last is for the equilibrium.
     pub(super) fn descent(&self, inputs: Vec<Vec<f64>>) -> Descent {
         let (best, SearchSettings { penalty, trust, .. }) = (self.run(inputs), *self.settings());
@@ -128,6 +156,14 @@ impl Search<'_> {
         let prices = best.values.iter().map(price).collect();
         let trust = vec![trust; best.inputs[0].len()];
         Descent { best, trust, prices, linear: None, is_wanted: false }
+    }
+
+    /// Begins `descent` again where it is, with the margins of this search. What has a price keeps it, and with it the
+    /// curvature that kept the last answers in its set.
+    pub(super) fn again(&self, descent: &mut Descent) {
+        let next = self.descent(descent.best.inputs.clone());
+        let prices = descent.prices.iter().zip(&next.prices).map(|(a, b)| a.max(*b)).collect();
+        *descent = Descent { prices, is_wanted: descent.is_wanted, ..next };
     }
 
     /// Predicts the trajectory under `inputs`, of which the last is for the equilibrium.
@@ -213,7 +249,7 @@ impl Search<'_> {
 
     /// Improves the best trajectory of `descent` by at most `iterations` quadratic programs.
     pub(super) fn improve(&self, descent: &mut Descent, iterations: u32) {
-        let SearchSettings { least_trust, as_expected, .. } = *self.settings();
+        let SearchSettings { least_trust, as_expected, learned, fading, penalty, .. } = *self.settings();
         for _ in 0..iterations {
             let Descent { best, trust, prices, linear, .. } = descent;
             if !best.merit.is_finite() || trust.iter().all(|t| *t < least_trust) {
@@ -237,6 +273,9 @@ impl Search<'_> {
                 }
             }
             let gain = best.merit - next.merit;
+            if gain <= 0.0 && self.is_of_many() && self.learn(prices, best, &next) {
+                continue;
+            }
             if gain > as_expected * expected {
                 trust.iter_mut().for_each(|t| *t = (2.0 * *t).min(2.0));
             } else if gain < 0.3 * expected {
@@ -244,13 +283,31 @@ impl Search<'_> {
             }
             if gain > 0.0 {
                 let settled = next.violation <= 0.0 && gain <= 1e-2 * best.merit;
-                (*best, *prices, *linear) = (next, answer.prices, None);
+                let faded = |(new, old): (&f64, &f64)| new.max(fading * old.min(learned * penalty));
+                *prices = match self.is_of_many() {
+                    true => answer.prices.iter().zip(prices.iter()).map(faded).collect(),
+                    false => answer.prices,
+                };
+                (*best, *linear) = (next, None);
                 if settled {
                     // Nothing is left to gain.
                     trust.fill(0.0);
                 }
             }
         }
+    }
+
+    /// Gives a price to what `next` breaks and `best` did not, though the linear model expected neither: so the next program
+    /// knows how it curves. Returns whether there is any that had none.
+    fn learn(&self, prices: &mut [f64], best: &Trajectory, next: &Trajectory) -> bool {
+        let least = self.settings().learned * self.settings().penalty;
+        let mut learned = false;
+        for (price, (before, after)) in prices.iter_mut().zip(best.values.iter().zip(&next.values)) {
+            if before.2 >= 0.0 && after.2 < 0.0 && *price < least {
+                (*price, learned) = (least, true);
+            }
+        }
+        learned
     }
 
     /// The linear models near `at`, one for every hold.
@@ -447,9 +504,9 @@ impl Search<'_> {
         let settings = DefaultSettings {
             verbose: false,
             max_iter: iterations,
-            iterative_refinement_enable: !self.quick,
-            tol_gap_abs: gaps[usize::from(self.quick)],
-            tol_gap_rel: gaps[usize::from(self.quick)],
+            iterative_refinement_enable: !(self.quick || self.is_of_many()),
+            tol_gap_abs: gaps[usize::from(self.quick || self.is_of_many())],
+            tol_gap_rel: gaps[usize::from(self.quick || self.is_of_many())],
             tol_feas: feasible,
             ..DefaultSettings::default()
         };

@@ -35,6 +35,17 @@ pub(crate) struct SearchSettings {
     // Guesses, and how far they are followed.
     /// First guesses: inputs as a part of their bounds, and the part of the time for which they are held.
     pub(crate) guesses: [[f64; 2]; 4],
+    /// Largest number of inputs with which several guesses are followed at once; with more, the first is followed alone before.
+    pub(crate) at_once: usize,
+    /// The rounds of a guess that is followed alone.
+    pub(crate) alone: [(usize, u32); 2],
+    /// The quadratic programs for ways that ignore what is in the way.
+    pub(crate) unhindered: u32,
+    /// The number of guesses that push these ways to the sides, and how hard, as a part of the bounds.
+    pub(crate) pushes: u32,
+    pub(crate) pushed: f64,
+    /// The rounds of these guesses.
+    pub(crate) passed: [(usize, u32); 2],
     /// Largest number of inputs of which a guess moves one at a time.
     pub(crate) one_by_one: usize,
     /// Largest number of evaluations of a policy over a hold of the search, which uses their mean.
@@ -61,6 +72,8 @@ pub(crate) struct SearchSettings {
     pub(crate) tighter: f64,
     /// Largest number of checks of a trajectory, each after the first with more margin.
     pub(crate) tightened: u32,
+    /// Parts of a hold between which many vehicles are looked at, before they are tightened.
+    pub(crate) between: u32,
     /// The number of quadratic programs between two checks.
     pub(crate) tightening: u32,
     /// Largest number of consecutive checks whose shortfall hardly decreases.
@@ -98,6 +111,10 @@ pub(crate) struct SearchSettings {
     pub(crate) near: f64,
     /// Least price of a row that counts, in units of that of a violation.
     pub(crate) priced: f64,
+    /// Price of a row that a rejected step broke, in the same unit.
+    pub(crate) learned: f64,
+    /// What is left of such a price after an accepted step.
+    pub(crate) fading: f64,
     /// Least size of a requirement that is nearly met, as a part of the largest |h| along the trajectory.
     pub(crate) least_size: f64,
     /// Largest rate at the end that counts as none, as a part of the largest of that state along the trajectory.
@@ -113,7 +130,7 @@ pub(crate) struct SearchSettings {
     /// Largest number of iterations of the solver.
     pub(crate) iterations: u32,
     /// Gap between the solver's answer and its bound, absolute and as a part of the merit: in a search that has time, and in
-    /// a quick one.
+    /// a quick one or one for many inputs.
     pub(crate) gaps: [f64; 2],
     /// Residual of the solver's constraints, absolute and as a part of their terms.
     pub(crate) feasible: f64,
@@ -182,6 +199,16 @@ pub(crate) const SETTINGS: SearchSettings = SearchSettings {
     // To either side: for a third of the time, briefly, and as a nudge of two holds. The last is a hard turn, which no other
     // guess leads to (`a_hard_turn_is_found`). Each costs a rollout per side, and may displace others in `rounds`.
     guesses: [[0.4, 0.35], [0.6, 0.1], [0.5, 0.0], [1.0, 0.6]],
+    // With two inputs a program takes milliseconds and the first guess seldom leads around an obstacle; with those of four
+    // vehicles it takes a tenth of a second, and they mostly pass one another.
+    at_once: 2,
+    alone: [(1, 6), (1, 20)],
+    // Ways without one another are nearly straight, and take few programs. Ten robots on a circle that swap places meet in its middle, and
+    // none of their ways gives way until they are pushed (`ten_robots_swap_places`).
+    unhindered: 6,
+    pushes: 6,
+    pushed: 0.3,
+    passed: [(6, 4), (3, 16)],
     // Each guess is followed once, and a team of ten would have eighty of each size.
     one_by_one: 8,
     // A limit of time: a policy may be slow, and a hold of the search has thousands of samples at short periods.
@@ -216,6 +243,8 @@ pub(crate) const SETTINGS: SearchSettings = SearchSettings {
     // A trajectory is tightened as long as less and less is missed. The first limit is one of time. A set that is small
     // compared with its distance needs several (`small_sets_are_promised_from_far_away`).
     tightened: 12,
+    // Two vehicles that meet in a hold are nearest in its middle or close to it.
+    between: 8,
     // As few as show whether the shortfall decreases. With more, a trajectory that gets nowhere costs more.
     tightening: 4,
     // Three checks in a row that win less than 30 % each: the trajectory gets nowhere.
@@ -256,6 +285,10 @@ pub(crate) const SETTINGS: SearchSettings = SearchSettings {
     // without a price adds nothing.
     near: 0.1,
     priced: 1e-6,
+    // Enough that no input is worth it; and less than what is broken already. Without it a program for ten robots leaves a round goal
+    // sideways, since nothing but a price tells it that the goal is round. There is no measurement for its size.
+    learned: 0.1,
+    fading: 0.5,
     // A small set far away: its size is that of h near it, of which nearly nothing is left if it is nearly met. So one whose
     // h falls to 1e-4 keeps a size. With less, a violation of round-off counts as large.
     least_size: 1e-4,
