@@ -158,12 +158,14 @@ impl Search<'_> {
         Descent { best, trust, prices, linear: None, is_wanted: false }
     }
 
-    /// Begins `descent` again where it is, with the margins of this search. What has a price keeps it, and with it the
-    /// curvature that kept the last answers in its set.
+    /// Begins `descent` again where it is, with the margins of this search. Of many vehicles what has a price keeps it, and with
+    /// it the curvature that kept the last answers in its set.
     pub(super) fn again(&self, descent: &mut Descent) {
-        let next = self.descent(descent.best.inputs.clone());
-        let prices = descent.prices.iter().zip(&next.prices).map(|(a, b)| a.max(*b)).collect();
-        *descent = Descent { prices, is_wanted: descent.is_wanted, ..next };
+        let mut next = self.descent(descent.best.inputs.clone());
+        if self.is_of_many() {
+            next.prices.iter_mut().zip(&descent.prices).for_each(|(new, old)| *new = new.max(*old));
+        }
+        *descent = Descent { is_wanted: descent.is_wanted, ..next };
     }
 
     /// Predicts the trajectory under `inputs`, of which the last is for the equilibrium.
