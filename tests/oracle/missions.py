@@ -14,6 +14,7 @@ import sys
 
 import casadi
 import numpy as np
+from optimise import step
 
 # Part of the possible missions that has to be accepted.
 ACCEPTED = 0.9
@@ -34,15 +35,6 @@ def rate(x, u, is_point, cos=casadi.cos, sin=casadi.sin):
     if is_point:
         return x[2], x[3], u[0], u[1]
     return x[3] * cos(x[2]), x[3] * sin(x[2]), u[1], u[0]
-
-
-def step(f, x, dt):
-    """One step of Runge and Kutta of order 4."""
-    a = f(x)
-    b = f(x + dt / 2 * a)
-    c = f(x + dt / 2 * b)
-    d = f(x + dt * c)
-    return x + dt / 6 * (a + 2 * b + 2 * c + d)
 
 
 def schedule(case, random):
@@ -79,7 +71,7 @@ def demands(case, instants):
 
 
 def programme(case, instants):
-    """The nonlinear programme: states and inputs of every hold, the times of the nodes, and how far outside at worst."""
+    """The nonlinear programme: states, inputs, the worst distance outside, and the times of the nodes."""
     opti = casadi.Opti()
     count = HOLDS + int(AFTER * HOLDS)
     # A visit is at a node: the grid is bent to it.
@@ -118,7 +110,7 @@ def programme(case, instants):
 
 def guess(case, instants, times, random):
     """States along straight ways between the visits, bent to a side at random."""
-    ways = [(0.0, case["start"][:2])] + [(t, case["parts"][i]["centre"]) for i, t in sorted(instants.items(), key=lambda v: v[1])]
+    ways = [(0.0, case["start"][:2])] + [(t, case["parts"][i]["centre"]) for i, t in instants.items()]
     ways += [(USED * part["window"][1], part["centre"]) for part in case["parts"] if part["kind"] == "reach"]
     ways.sort(key=lambda way: way[0])
     knots = [way[0] for way in ways]
@@ -149,7 +141,8 @@ def outside_at_most(case, instants, times, inputs):
 def is_possible(case, random):
     """Whether some schedule leads to a path that does the mission."""
     for _ in range(TRIES):
-        instants = next((found for found in (schedule(case, random) for _ in range(50)) if found is not None), None)
+        drawn = (schedule(case, random) for _ in range(50))
+        instants = next((found for found in drawn if found is not None), None)
         if instants is None:
             return False
         opti, x, u, outside, times = programme(case, instants)
