@@ -119,7 +119,8 @@ impl Walk<'_> {
                 match tape::function(name).ok()?.0 {
                     Function::Sqrt => Some(a.sqrt()),
                     Function::Exp => Some(a.exp()),
-                    Function::Ln => Some(a.ln()),
+                    // Held at 0 it has no logarithm.
+                    Function::Ln => (a.high > 0.0).then(|| a.ln()),
                     Function::Sin => Some(a.sin()),
                     Function::Cos => Some(a.cos()),
                     Function::Atan => Some(a.atan()),
@@ -216,6 +217,7 @@ mod tests {
             "1 - 0.99999 * tanh(t) - x^2",
             "1 - 1 / x^2",
             "1 - tan(x)",
+            "ln(min(x, x)) - 4",
             // Not a number.
             "1 / 0 - x",
             "sqrt(-1) - x",
