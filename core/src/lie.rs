@@ -577,7 +577,7 @@ where
         ($($n:literal => $k:literal),*) => {
             match n {
                 // A constant condition: impossible degrees are not compiled.
-                $($n if const { $n <= P::LARGEST_DEGREE } => {
+                $($n if const { $n <= P::LARGEST_DEGREE && $n <= MAX_RELATIVE_DEGREE } => {
                     Ok(Box::new(Along::<P, B, NX, NU, $k, $n> { plant, barrier, place, beside, dims: PhantomData }) as _)
                 })*
                 _ => Err(no_degree(n, P::LARGEST_DEGREE.min(MAX_RELATIVE_DEGREE))),

@@ -1,6 +1,7 @@
 //! Errors of a model: which part is wrong, and why.
 
-use std::fmt;
+use alloc::string::String;
+use core::fmt;
 
 /// An error in a model: which part cannot be used, and what is wrong with it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -31,4 +32,4 @@ impl fmt::Display for Error {
     }
 }
 
-impl std::error::Error for Error {}
+impl core::error::Error for Error {}

@@ -18,10 +18,12 @@ use punctual_core::lie::{DerivativeSource, RelativeDegree};
 use punctual_core::scalar::Scalar;
 use punctual_core::{MAX_INPUTS, MAX_ROWS};
 
-use crate::motion::{self, Equations, Identity};
+use crate::motion::Equations;
+use crate::operation::{Operation, Register, Step};
 use crate::series::Series;
 use crate::syntax::{Function, Operator};
-use crate::tape::{Operation, Record, Register, Step, Value};
+use crate::source::{self, Identity};
+use crate::tape::{Record, Value};
 use crate::{Error, MAX_OPERATIONS, MAX_STATES};
 
 /// The handle of a number in a computation.
@@ -169,7 +171,7 @@ impl CodeModel {
 
     /// The plant, for simulation.
     pub fn plant(&self) -> Box<dyn DynPlant> {
-        motion::simulated(&self.equations)
+        source::simulated(&self.equations)
     }
 
     /// Barrier number `index` of the code.
@@ -196,13 +198,13 @@ pub struct CodeBarrier {
 impl CodeBarrier {
     /// The relative degree, found at built-in samples of states within `ranges`.
     pub fn relative_degree(&self, ranges: &[[f64; 2]]) -> RelativeDegree {
-        motion::relative_degree(&self.equations, &self.equations, ranges, false)
+        source::relative_degree(&self.equations, &self.equations, ranges, false)
     }
 
     /// The relative degree with nonzero inputs. It also sees an input that only multiplies another one, as a
     /// turn rate multiplies a speed or a thrust.
     pub fn driven_degree(&self, ranges: &[[f64; 2]]) -> RelativeDegree {
-        motion::relative_degree(&self.equations, &self.equations, ranges, true)
+        source::relative_degree(&self.equations, &self.equations, ranges, true)
     }
 
     /// Its derivatives up to relative degree `n`, for a filter.
@@ -211,7 +213,7 @@ impl CodeBarrier {
     ///
     /// `n` outside 1 to [`MAX_RELATIVE_DEGREE`](punctual_core::MAX_RELATIVE_DEGREE).
     pub fn source(&self, n: usize) -> Result<Box<dyn DerivativeSource>, Error> {
-        motion::source(&self.equations, &self.equations, n, &self.identity)
+        source::source(&self.equations, &self.equations, n, &self.identity)
     }
 }
 

@@ -3,7 +3,7 @@
 use punctual_core::scalar::Scalar;
 
 use crate::series::Series;
-use crate::tape::{Register, Step};
+use crate::operation::{Register, Step};
 
 /// Evaluates expressions such as `-k * v`, made by [`Model::functions`](crate::Model::functions). With
 /// [`Tangent`](punctual_core::jet::Tangent)s, it also gives their derivatives along a direction.

@@ -44,35 +44,63 @@
 //! | `syntax` | parsing text into trees |
 //! | `affine` | whether inputs enter linearly |
 //! | `units` | whether the units can be right |
+//! | `operation` | the operations of a tape |
 //! | `tape` | trees to one tape: constants folded, equal operations merged |
 //! | `scale` | how large an expression is |
 //! | `series` | Taylor coefficients of a tape |
 //! | `motion` | the motion of a plant, and the series of a barrier along it |
+//! | `recorded` | a plant and barriers as tapes alone, for rows: without expressions and std |
+//! | `source` | all that filters and simulations take from them |
 //! | `evaluated` | plants and barriers computed by foreign code |
 //! | `functions` | values of expressions of state and time |
 //! | `model` | plants and barriers given by expressions |
+#![cfg_attr(not(feature = "expressions"), no_std)]
 #![forbid(unsafe_code)]
 // Elementary functions come from the core: see clippy.toml.
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 
-mod affine;
+extern crate alloc;
+
 mod error;
-pub mod evaluated;
-mod functions;
-mod model;
+// Recorded tapes use a part of it.
+#[cfg_attr(not(feature = "expressions"), allow(dead_code))]
 mod motion;
-mod names;
-mod scale;
+mod operation;
+pub mod recorded;
+#[cfg_attr(not(feature = "expressions"), allow(dead_code))]
 mod series;
+
+#[cfg(feature = "expressions")]
+mod affine;
+#[cfg(feature = "expressions")]
+pub mod evaluated;
+#[cfg(feature = "expressions")]
+mod functions;
+#[cfg(feature = "expressions")]
+mod model;
+#[cfg(feature = "expressions")]
+mod names;
+#[cfg(feature = "expressions")]
+mod scale;
+#[cfg(feature = "expressions")]
+mod source;
+#[cfg(feature = "expressions")]
 mod syntax;
+#[cfg(feature = "expressions")]
 mod tape;
+#[cfg(feature = "expressions")]
 mod units;
 
 pub use error::Error;
+#[cfg(feature = "expressions")]
 pub use functions::Functions;
+#[cfg(feature = "expressions")]
 pub use model::{Barrier, Model};
+#[cfg(feature = "expressions")]
 pub use names::nearest;
+#[cfg(feature = "expressions")]
 pub use syntax::{FUNCTIONS, MAX_LENGTH, MAX_NESTING, MAX_OPERATORS, is_in_name, is_reserved, mentions};
+#[cfg(feature = "expressions")]
 pub use units::{Unit, unit_of};
 
 /// Most states of a model.

@@ -10,10 +10,13 @@ use punctual_core::lie::{DerivativeSource, RelativeDegree};
 use punctual_core::scalar::Scalar;
 
 use crate::functions::Functions;
-use crate::motion::{self, Equations, Identity};
+use crate::motion::Equations;
+use crate::operation::{Register, Step, needed};
 use crate::series::Series;
 use crate::syntax::{self, TIME, Tree};
-use crate::tape::{Record, Register, Step, Tape, Value, needed, unknown};
+use crate::recorded::{BarrierTape, PlantTape};
+use crate::source::{self, Identity};
+use crate::tape::{Record, Tape, Value, unknown};
 use crate::{Error, MAX_STATES, affine, scale};
 
 /// A plant `ẋ = f(x) + g(x) u` with one expression for each component.
@@ -151,7 +154,7 @@ impl Model {
 
     /// The plant, for simulation.
     pub fn plant(&self) -> Box<dyn DynPlant> {
-        motion::simulated(&self.equations(None))
+        source::simulated(&self.equations(None))
     }
 
     /// The barrier `h(t, x)` given by an expression.
@@ -206,7 +209,7 @@ pub struct Barrier {
 impl Barrier {
     /// The relative degree, found at built-in samples of states within `ranges`.
     pub fn relative_degree(&self, ranges: &[[f64; 2]]) -> RelativeDegree {
-        motion::relative_degree(
+        source::relative_degree(
             &self.model.equations(None),
             &self.model.equations(Some(self.h)),
             ranges,
@@ -217,7 +220,7 @@ impl Barrier {
     /// The relative degree with nonzero inputs. It also sees an input that only multiplies another one, as a
     /// turn rate multiplies a speed or a thrust.
     pub fn driven_degree(&self, ranges: &[[f64; 2]]) -> RelativeDegree {
-        motion::relative_degree(
+        source::relative_degree(
             &self.model.equations(None),
             &self.model.equations(Some(self.h)),
             ranges,
@@ -232,7 +235,38 @@ impl Barrier {
     /// `n` outside 1 to [`MAX_RELATIVE_DEGREE`](punctual_core::MAX_RELATIVE_DEGREE).
     pub fn source(&self, n: usize) -> Result<Box<dyn DerivativeSource>, Error> {
         let Self { model, h } = self;
-        motion::source(&model.equations(None), &model.equations(Some(*h)), n, &model.identity)
+        source::source(&model.equations(None), &model.equations(Some(*h)), n, &model.identity)
+    }
+}
+
+impl Barrier {
+    /// The tapes of the plant and of the barrier. That of the plant is the same for all barriers along one model.
+    pub fn recorded(&self) -> (PlantTape, BarrierTape) {
+        let Self { model, h } = self;
+        let Tape { steps, registers, .. } = &model.tape;
+        let (states, inputs) = (model.states.len(), model.inputs.len());
+        let of_plant = needed(steps, &model.derivatives, *registers);
+        let mut of_barrier = needed(steps, &[*h], *registers);
+        of_barrier.retain(|step| !of_plant.contains(step));
+        // The registers that are left get the next numbers.
+        let mut next = states + inputs + 1;
+        let mut numbers: Vec<Register> = (0..*registers).collect();
+        let mut renumbered = |steps: &[Step]| {
+            let mut moved = Vec::new();
+            for step in steps {
+                let operation = step.operation.map(|read| numbers[read]);
+                for result in 0..operation.results() {
+                    numbers[step.to + result] = next + result;
+                }
+                moved.push(Step { operation, to: next });
+                next += operation.results();
+            }
+            moved
+        };
+        let (of_plant, of_barrier) = (renumbered(&of_plant), renumbered(&of_barrier));
+        let derivatives = model.derivatives.iter().map(|d| numbers[*d]).collect();
+        let plant = PlantTape { states, inputs, steps: of_plant, derivatives };
+        (plant, BarrierTape { steps: of_barrier, h: numbers[*h] })
     }
 }
 

@@ -11,12 +11,14 @@
 //! A. Griewank and A. Walther, *Evaluating Derivatives*, 2nd ed., SIAM 2008, section 13.2
 //! (doi:10.1137/1.9780898717761).
 
-use std::cmp::Ordering;
-use std::ops::Range;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::cmp::Ordering;
+use core::ops::Range;
 
 use punctual_core::scalar::Scalar;
 
-use crate::tape::{Operation, Register, Step};
+use crate::operation::{Operation, Register, Step};
 
 /// The coefficients of every register.
 #[derive(Clone, Debug)]

@@ -181,6 +181,55 @@ proptest! {
     }
 }
 
+/// The bits of everything that rows ask of a source at one sample.
+fn bits(source: &dyn DerivativeSource, x: &[f64], u: &[f64]) -> Vec<u64> {
+    const T: f64 = 0.3;
+    const AHEAD: f64 = 0.01;
+    let (mut here, mut ahead, mut of_row) = (Derivatives::ZERO, Ahead::ZERO, Ahead::ZERO);
+    source.evaluate(T, x, &mut here);
+    let model = source.predict().expect("a model");
+    let (mut moved, mut rate) = (x.to_vec(), x.to_vec());
+    model.ahead(T, x, u, AHEAD, &mut ahead);
+    model.ahead_of_row(T, x, u, AHEAD, &mut of_row);
+    model.flow(&mut moved, u, AHEAD);
+    model.rate(x, u, &mut rate);
+    let lowest = model.lowest_held(T, x, u, AHEAD, f64::INFINITY).unwrap_or(f64::NAN);
+    let all = [ahead, of_row].into_iter().flat_map(|a| [a.value.to_vec(), a.gradient.as_flattened().to_vec()]);
+    let all = all.flatten().chain(moved).chain(rate).chain(here.drift).chain(here.row);
+    all.chain([here.lower_sensitivity, model.value(T, x), lowest]).map(f64::to_bits).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, cases: 400, ..ProptestConfig::default() })]
+
+    /// Two barriers, which share their memory, in turn.
+    #[test]
+    fn recorded_tapes_have_the_bits_of_their_model(
+        plant in [tree(false), tree(false), tree(false)],
+        barriers in [tree(true), tree(true)],
+        x in prop::array::uniform2(0.2_f64..3.0),
+        degrees in prop::array::uniform2(1_usize..=3),
+    ) {
+        let derivatives = [
+            format!("{} + u", plant[0].text()),
+            format!("{} + {}*u + w", plant[1].text(), plant[2].text()),
+        ];
+        let model = Model::new(&["x", "y"], &["u", "w"], &[], &[&derivatives[0], &derivatives[1]]).expect("a model");
+        let barriers = barriers.map(|barrier| model.barrier(&barrier.text()).expect("a barrier"));
+        let recorded = barriers.each_ref().map(punctual_models::Barrier::recorded);
+        prop_assert_eq!(&recorded[0].0, &recorded[1].0);
+        let plant = recorded[0].0.clone();
+        let tapes = recorded.into_iter().zip(degrees).map(|((_, tape), n)| (tape, n)).collect();
+        let found = punctual_models::recorded::sources(plant, tapes).expect("whole tapes");
+        for _ in 0..2 {
+            for ((barrier, found), n) in barriers.iter().zip(&found).zip(degrees) {
+                let wanted = barrier.source(n).expect("in range");
+                prop_assert_eq!(bits(&**found, &x, &[0.3, -0.4]), bits(&*wanted, &x, &[0.3, -0.4]));
+            }
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, cases: 2000, ..ProptestConfig::default() })]
 

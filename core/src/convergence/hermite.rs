@@ -68,12 +68,12 @@ impl Profile for Hermite {
     /// Entries above n are 0.
     #[inline(always)]
     fn evaluate(&self, anchor: &[f64], deadline: f64, elapsed: f64) -> Derivatives {
-        const { assert!(MAX_RELATIVE_DEGREE == 8, "the degrees below") };
+        const { assert!(MAX_RELATIVE_DEGREE <= 8, "the degrees below") };
         // With n known to the compiler the short loops unroll.
         macro_rules! by_degree {
             ($($n:literal),*) => {
                 match anchor.len() {
-                    $($n => anchor.first_chunk::<$n>().map(|a| Self::of_degree(a, deadline, elapsed)),)*
+                    $($n if $n <= MAX_RELATIVE_DEGREE => anchor.first_chunk::<$n>().map(|a| Self::of_degree(a, deadline, elapsed)),)*
                     _ => None,
                 }
             };

@@ -110,8 +110,11 @@ pub trait Predict {
     /// Writes ẋ at `x` under `u`.
     fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]);
 
-    /// Writes the expansion of every state, starting at `x`, under the held input `u`.
-    fn path(&self, x: &[f64], u: &[f64], out: &mut [Expansion]);
+    /// Writes the expansion of every state, starting at `x`, under the held input `u`. The default has none and writes NaN,
+    /// which no plan accepts.
+    fn path(&self, _x: &[f64], _u: &[f64], out: &mut [Expansion]) {
+        out.fill([f64::NAN; EXPANSION_ORDERS]);
+    }
 
     /// Whether h at a given state depends on component `state` of it: false only where it certainly does not. The default is true.
     fn reads(&self, state: usize) -> bool {
@@ -122,8 +125,11 @@ pub trait Predict {
     /// h at time `t` (s) and state `x`.
     fn value(&self, t: f64, x: &[f64]) -> f64;
 
-    /// Writes the expansion of h along `path`, which holds the expansions of all states, starting at `t`.
-    fn value_along(&self, t: f64, path: &[Expansion], out: &mut Expansion);
+    /// Writes the expansion of h along `path`, which holds the expansions of all states, starting at `t`. The default has none
+    /// and writes NaN.
+    fn value_along(&self, _t: f64, _path: &[Expansion], out: &mut Expansion) {
+        out.fill(f64::NAN);
+    }
 
     /// Writes enclosures of the first `orders` coefficients, 1 to [`EXPANSION_ORDERS`] − 1, of ẋ under `u`: as a series in
     /// time that begins anywhere on a stretch of a path, from the enclosures of the expansions of all states that begin

@@ -4,18 +4,23 @@ use core::ops::{BitAnd, BitOr, BitOrAssign, Sub};
 
 use crate::MAX_ROWS;
 
-const _: () = assert!(MAX_ROWS == u128::BITS as usize, "one bit per row");
+#[cfg(not(feature = "small"))]
+type Bits = u128;
+#[cfg(feature = "small")]
+type Bits = u64;
+
+const _: () = assert!(MAX_ROWS == Bits::BITS as usize, "one bit per row");
 
 /// Some of at most [`MAX_ROWS`] rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct RowSet(u128);
+pub struct RowSet(Bits);
 
 impl RowSet {
     /// No row.
     pub const EMPTY: Self = Self(0);
 
     /// Every row.
-    pub const ALL: Self = Self(u128::MAX);
+    pub const ALL: Self = Self(Bits::MAX);
 
     /// Row `i` alone.
     pub const fn of(i: usize) -> Self {
@@ -24,7 +29,7 @@ impl RowSet {
 
     /// The first `count` rows.
     pub const fn first(count: usize) -> Self {
-        Self(match u128::MAX.checked_shr((MAX_ROWS - count) as u32) {
+        Self(match Bits::MAX.checked_shr((MAX_ROWS - count) as u32) {
             Some(bits) => bits,
             None => 0,
         })
@@ -74,7 +79,7 @@ impl RowSet {
     /// The rows of `0..count` for which `f` is true.
     #[inline(always)]
     pub fn with(count: usize, f: impl Fn(usize) -> bool) -> Self {
-        (0..count).fold(Self::EMPTY, |Self(bits), i| Self(bits | u128::from(f(i)) << i))
+        (0..count).fold(Self::EMPTY, |Self(bits), i| Self(bits | Bits::from(f(i)) << i))
     }
 }
 
