@@ -315,7 +315,7 @@ pub trait DynPlant: Send {
 }
 
 /// The first `N` of the numbers `x`.
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 pub(crate) fn first<T: Scalar, const N: usize>(x: &[T]) -> [T; N] {
     *x.first_chunk().expect("a number for each component")
 }

@@ -172,7 +172,7 @@ fn half_product(a: u128, b: u128) -> u128 {
 }
 
 /// Sine of y + tail, |y| ≤ π/4, where the tail is round-off of y.
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 fn sine(y: f64, tail: Option<f64>) -> f64 {
     const S: [f64; 6] = [
         -1.666_666_666_666_663_2e-1,
@@ -192,7 +192,7 @@ fn sine(y: f64, tail: Option<f64>) -> f64 {
 }
 
 /// Cosine of y + tail, as [`sine`].
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 fn cosine(y: f64, tail: f64) -> f64 {
     const C: [f64; 6] = [
         4.166_666_666_666_66e-2,

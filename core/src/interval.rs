@@ -67,14 +67,14 @@ impl Interval {
 
     /// Encloses what is off by the given part of each bound, as [`ROUNDED`] and others count it. All numbers where a bound has
     /// overflowed inward.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn outward(self, part: f64) -> Self {
         let Self { low, high } = self.moved(part);
         Self::new(low, high)
     }
 
     /// The same, for finite bounds.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn moved(self, part: f64) -> Self {
         Self { low: self.low - self.low.abs() * part, high: self.high + self.high.abs() * part }
     }
@@ -136,7 +136,7 @@ const ROUNDED_TWICE: f64 = 2.0 * f64::EPSILON;
 const FUNCTION: f64 = 4.0 * f64::EPSILON;
 
 /// Whether the product with it is exact, since it is 0 or a power of two.
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 fn keeps_digits(factor: f64) -> bool {
     const SIGN_AND_EXPONENT: u32 = 64 - (f64::MANTISSA_DIGITS - 1);
     factor.to_bits() << SIGN_AND_EXPONENT == 0

@@ -131,8 +131,14 @@ pub mod internal {
 /// Largest relative degree n supported: the order of the highest derivative of h that is taken. With the feature `small`, 4.
 pub const MAX_RELATIVE_DEGREE: usize = if cfg!(feature = "small") { 4 } else { 8 };
 
-/// Largest number of inputs, dim u. With the feature `small`, 4.
-pub const MAX_INPUTS: usize = if cfg!(feature = "small") { 4 } else { 32 };
+/// Largest number of inputs, dim u. With the feature `small`, 4; with `two-inputs`, 2.
+pub const MAX_INPUTS: usize = if cfg!(feature = "two-inputs") {
+    2
+} else if cfg!(feature = "small") {
+    4
+} else {
+    32
+};
 
 /// Largest number of rows of a quadratic program, and so of barriers. With the feature `small`, 64.
 pub const MAX_ROWS: usize = if cfg!(feature = "small") { 64 } else { 128 };

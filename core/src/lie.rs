@@ -169,7 +169,7 @@ where
     }
 
     /// Writes the derivatives given by the coefficients of `h`.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn write(h: &Response<NU, K>, out: &mut Derivatives) {
         *out = Derivatives::ZERO;
         let mut factorial = 1.0;

@@ -21,8 +21,8 @@ use punctual_core::{MAX_INPUTS, MAX_ROWS};
 use crate::motion::Equations;
 use crate::operation::{Operation, Register, Step};
 use crate::series::Series;
-use crate::syntax::{Function, Operator};
 use crate::source::{self, Identity};
+use crate::syntax::{Function, Operator};
 use crate::tape::{Record, Value};
 use crate::{Error, MAX_OPERATIONS, MAX_STATES};
 

@@ -2,8 +2,8 @@
 
 use punctual_core::scalar::Scalar;
 
-use crate::series::Series;
 use crate::operation::{Register, Step};
+use crate::series::Series;
 
 /// Evaluates expressions such as `-k * v`, made by [`Model::functions`](crate::Model::functions). With
 /// [`Tangent`](punctual_core::jet::Tangent)s, it also gives their derivatives along a direction.

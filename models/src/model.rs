@@ -12,10 +12,10 @@ use punctual_core::scalar::Scalar;
 use crate::functions::Functions;
 use crate::motion::Equations;
 use crate::operation::{Register, Step, needed};
-use crate::series::Series;
-use crate::syntax::{self, TIME, Tree};
 use crate::recorded::{BarrierTape, PlantTape};
+use crate::series::Series;
 use crate::source::{self, Identity};
+use crate::syntax::{self, TIME, Tree};
 use crate::tape::{Record, Tape, Value, unknown};
 use crate::{Error, MAX_STATES, affine, scale};
 

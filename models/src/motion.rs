@@ -142,7 +142,13 @@ impl<E: Equations, C: Scalar> Flow<E, C> {
     }
 }
 
-pub(crate) fn moved<E: Equations>(flow: &mut Flow<E, f64>, x: &mut [f64], u: &[f64], duration: f64, steps: usize) {
+pub(crate) fn moved<E: Equations>(
+    flow: &mut Flow<E, f64>,
+    x: &mut [f64],
+    u: &[f64],
+    duration: f64,
+    steps: usize,
+) {
     flow.set_state(x.iter().copied());
     flow.hold(u.iter().copied());
     flow.run(duration, steps);
@@ -330,14 +336,7 @@ impl<E: Equations> Held<E> {
     }
 
     /// What [`lowest_held`](punctual_core::lie::Predict::lowest_held) returns.
-    pub(crate) fn lowest(
-        &mut self,
-        t: f64,
-        x: &[f64],
-        u: &[f64],
-        duration: f64,
-        wanted: f64,
-    ) -> Option<f64> {
+    pub(crate) fn lowest(&mut self, t: f64, x: &[f64], u: &[f64], duration: f64, wanted: f64) -> Option<f64> {
         let Self { value, few_over, states: held, rate } = self;
         rates_at(&mut value.flow, x, u, rate);
         let Flow { equations, series, .. } = &mut few_over.flow;

@@ -19,6 +19,11 @@ use punctual_core::scalar::Scalar;
 use punctual_core::{MAX_INPUTS, MAX_RELATIVE_DEGREE};
 use spin::Mutex;
 
+#[cfg(feature = "serde")]
+mod size;
+#[cfg(feature = "serde")]
+pub use size::{BarrierSize, PlantSize, Tallied, Tally, memory};
+
 use crate::motion::{Along, Equations, Held, moved, rates_at};
 use crate::operation::{Register, Step, needed};
 use crate::series::Series;
@@ -79,7 +84,9 @@ impl PlantTape {
     }
 
     fn check(&self) -> Result<(), Error> {
-        for (field, number, most) in [("states", self.states, MAX_STATES), ("inputs", self.inputs, MAX_INPUTS)] {
+        for (field, number, most) in
+            [("states", self.states, MAX_STATES), ("inputs", self.inputs, MAX_INPUTS)]
+        {
             if number == 0 || number > most {
                 return Err(Error::new(field, format!("is {number}, must be 1 to {most}")));
             }
@@ -115,7 +122,7 @@ pub fn sources(
         (registers, highest) = (registers.max(known), highest.max(*n));
     }
     Ok(match plant.inputs {
-        ..=2 => made::<2>(plant, barriers, registers, highest),
+        ..=2 if MAX_INPUTS > 4 => made::<2>(plant, barriers, registers, highest),
         _ => made::<MAX_INPUTS>(plant, barriers, registers, highest),
     })
 }
@@ -130,7 +137,8 @@ fn made<const M: usize>(
     let plant = Arc::new(plant);
     let alone = Recorded { plant: Arc::clone(&plant), barrier: None, of_value: false, registers: start };
     let along = Recorded { registers, ..alone.clone() };
-    let scratch = Scratch::<M> { along: Along::new(&alone, &along, highest), held: Held::new(&alone, &along) };
+    let scratch =
+        Scratch::<M> { along: Along::new(&alone, &along, highest), held: Held::new(&alone, &along) };
     let scratch = Arc::new(Mutex::new(scratch));
     let barrier = |(tape, n): (BarrierTape, usize)| {
         let read = tape.steps.iter().flat_map(|step| step.operation.reads()).flatten();

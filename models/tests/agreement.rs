@@ -194,7 +194,8 @@ fn bits(source: &dyn DerivativeSource, x: &[f64], u: &[f64]) -> Vec<u64> {
     model.flow(&mut moved, u, AHEAD);
     model.rate(x, u, &mut rate);
     let lowest = model.lowest_held(T, x, u, AHEAD, f64::INFINITY).unwrap_or(f64::NAN);
-    let all = [ahead, of_row].into_iter().flat_map(|a| [a.value.to_vec(), a.gradient.as_flattened().to_vec()]);
+    let all =
+        [ahead, of_row].into_iter().flat_map(|a| [a.value.to_vec(), a.gradient.as_flattened().to_vec()]);
     let all = all.flatten().chain(moved).chain(rate).chain(here.drift).chain(here.row);
     all.chain([here.lower_sensitivity, model.value(T, x), lowest]).map(f64::to_bits).collect()
 }

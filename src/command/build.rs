@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use punctual_cosim::coupling::Order;
 use punctual_cosim::error::Error;
-use punctual_cosim::package;
+use punctual_cosim::{package, whole};
 use punctual_fmu::configuration::{Configuration, FmiVersion};
 use punctual_modeldescription::SspVersion;
 
@@ -17,8 +17,16 @@ pub struct Arguments {
     /// The configuration file (TOML): `kind = "filter"`, `"plant"` or `"controller"`; or a system file
     configuration: PathBuf,
     /// The .fmu file to write; for a system file the .ssp file, with the FMUs it names, and those of the configurations it names
-    #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
+    #[arg(short, long, value_name = "FILE", required_unless_present = "embedded")]
+    output: Option<PathBuf>,
+    /// Writes a filter as a file for the C library instead, and beside it a header with the names of its states, inputs and barriers,
+    /// and its bytes: car.bin and car.h
+    #[arg(
+        long,
+        value_name = "FILE",
+        conflicts_with_all = ["output", "libraries", "fmi", "ssp", "scalars"]
+    )]
+    embedded: Option<PathBuf>,
     /// A shared library to put inside, for the platform that the file is for; repeat it for several [default: the one
     /// beside this program]
     #[arg(long = "library", value_name = "FILE")]
@@ -80,25 +88,22 @@ enum Versions {
 /// A configuration that cannot be used, a file that cannot be read or written, an FMU that does not work.
 pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     let file = &arguments.configuration;
-    if arguments.output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("ssp")) {
-        return pack(arguments, file);
+    // Clap asks for one of the two.
+    let output = match (&arguments.embedded, &arguments.output) {
+        (Some(to), _) => return embed(arguments, to),
+        (None, Some(output)) => output,
+        (None, None) => {
+            return Err(Error::configuration("--output", "is not given, must be a file to write"));
+        }
+    };
+    if output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("ssp")) {
+        return pack(arguments, file, output);
     }
     if arguments.ssp.is_some() {
         let message = "is for an .ssp file, which is made from a system file";
         return Err(Error::configuration("--ssp", message));
     }
-    let configuration = match super::read(file)? {
-        Configuration::Filter(filter) if arguments.master == Some(Master::Jacobi) => {
-            Configuration::Filter(filter.for_jacobi().map_err(|e| Error::from(e).in_file(file))?)
-        }
-        configuration @ (Configuration::Plant(_) | Configuration::Controller(_))
-            if arguments.master.is_some() =>
-        {
-            let message = format!("is for a filter, and {} is a {}", file.display(), configuration.kind());
-            return Err(Error::configuration("--master", message));
-        }
-        configuration => configuration,
-    };
+    let configuration = configuration(arguments)?;
     for note in configuration.in_degrees() {
         output::note(&format!("note: {note}"));
     }
@@ -117,9 +122,57 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
     for fmi in versions {
         let configuration = configuration.clone().for_fmi(fmi, experiment.arrays && !arguments.scalars);
         let beside = several && fmi == FmiVersion::Three;
-        let output = if beside { next_to(&arguments.output) } else { arguments.output.clone() };
+        let output = if beside { next_to(output) } else { output.clone() };
         build(configuration, &arguments.libraries, &output)?;
     }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The configuration, for the master that is asked for.
+fn configuration(arguments: &Arguments) -> Result<Configuration, Error> {
+    let file = &arguments.configuration;
+    Ok(match super::read(file)? {
+        Configuration::Filter(filter) if arguments.master == Some(Master::Jacobi) => {
+            Configuration::Filter(filter.for_jacobi().map_err(|e| Error::from(e).in_file(file))?)
+        }
+        configuration @ (Configuration::Plant(_) | Configuration::Controller(_))
+            if arguments.master.is_some() =>
+        {
+            let message = format!("is for a filter, and {} is a {}", file.display(), configuration.kind());
+            return Err(Error::configuration("--master", message));
+        }
+        configuration => configuration,
+    })
+}
+
+/// Writes the file for the C library, and its header.
+fn embed(arguments: &Arguments, to: &Path) -> Result<ExitCode, Error> {
+    let file = &arguments.configuration;
+    let configuration = configuration(arguments)?;
+    let Configuration::Filter(filter) = &configuration else {
+        let message = format!("is for a filter, and {} is a {}", file.display(), configuration.kind());
+        return Err(Error::configuration("--embedded", message));
+    };
+    let bytes = filter.embedded().map_err(|e| Error::from(e).in_file(file))?;
+    let bytes = bytes.to_bytes().map_err(|e| Error::configuration("--embedded", e.to_string()))?;
+    let header = to.with_extension("h");
+    if header == to {
+        let message =
+            format!("is {}, must have another ending than .h, which the header beside it has", to.display());
+        return Err(Error::configuration("--embedded", message));
+    }
+    let name = to.file_stem().unwrap_or_default().to_string_lossy();
+    whole::write(to, &bytes)?;
+    whole::write(&header, filter.embedded_header(&name, &bytes))?;
+    output::result(&format!(
+        "{}: {} states, {} inputs, {} barriers in {} bytes; their names are in {}",
+        to.display(),
+        filter.plant.states().len(),
+        filter.plant.inputs().len(),
+        filter.barrier.len(),
+        bytes.len(),
+        header.display(),
+    ));
     Ok(ExitCode::SUCCESS)
 }
 
@@ -167,7 +220,7 @@ pub fn execute_try_plugin(arguments: &TryPluginArguments) -> Result<ExitCode, Er
     Ok(ExitCode::SUCCESS)
 }
 
-fn pack(arguments: &Arguments, file: &Path) -> Result<ExitCode, Error> {
+fn pack(arguments: &Arguments, file: &Path, output: &Path) -> Result<ExitCode, Error> {
     if !arguments.libraries.is_empty() {
         let message = "is for one FMU; an .ssp file takes the FMUs that the system names as they are";
         return Err(Error::configuration("--library", message));
@@ -189,14 +242,14 @@ fn pack(arguments: &Arguments, file: &Path) -> Result<ExitCode, Error> {
         Master::GaussSeidel => Order::GaussSeidel,
         Master::Jacobi => Order::Jacobi,
     });
-    let packed = package::system::pack(file, &arguments.output, version, order)?;
+    let packed = package::system::pack(file, output, version, order)?;
     packed.warnings.iter().for_each(|warning| output::warning(warning));
     for note in &packed.notes {
         output::note(&format!("note: {note}"));
     }
     output::result(&format!(
         "{}: {} components from {} FMUs, {} connections, {} start values",
-        arguments.output.display(),
+        output.display(),
         packed.components,
         packed.fmus,
         packed.connections,

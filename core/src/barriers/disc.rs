@@ -30,7 +30,7 @@ impl Centre {
     }
 
     /// Squared distance of the position (the first two states) from the point at time `t`, in m².
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn distance_squared<S: Scalar, const NX: usize>(&self, t: S, x: &[S; NX]) -> S {
         let away = match self {
             // At rest there is nothing to multiply.
@@ -110,7 +110,7 @@ impl QuadraticDisc {
 impl<const NX: usize> Barrier<NX> for QuadraticDisc {
     const ONE_SIDED_CURVATURE: bool = true;
 
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn value<S: Scalar>(&self, t: S, x: &[S; NX]) -> S {
         -self.centre.distance_squared(t, x) + self.radius * self.radius
     }
@@ -172,7 +172,7 @@ impl DistanceDisc {
 impl<const NX: usize> Barrier<NX> for DistanceDisc {
     const ONE_SIDED_CURVATURE: bool = true;
 
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn value<S: Scalar>(&self, t: S, x: &[S; NX]) -> S {
         -(self.centre.distance_squared(t, x) + self.smoothing * self.smoothing).sqrt() + self.level
     }

@@ -33,7 +33,7 @@ pub struct Outside<B>(pub B);
 impl<B: Barrier<NX>, const NX: usize> Barrier<NX> for Outside<B> {
     const ONE_SIDED_CURVATURE: bool = B::ONE_SIDED_CURVATURE;
 
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn value<S: Scalar>(&self, t: S, x: &[S; NX]) -> S {
         -self.0.value(t, x)
     }

@@ -41,7 +41,7 @@ impl Approach {
     }
 
     /// The condition itself.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn condition(&self) -> &dyn Condition {
         match self {
             Self::Profile(condition) => condition,
@@ -51,7 +51,7 @@ impl Approach {
     }
 
     /// [`Condition::bound`].
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn bound(&self, at: &Sample) -> Bound {
         match self {
             Self::Profile(condition) => condition.bound(at),
@@ -61,7 +61,7 @@ impl Approach {
     }
 
     /// [`Condition::abilities`].
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn abilities(&self) -> Abilities {
         match self {
             Self::Profile(condition) => condition.abilities(),

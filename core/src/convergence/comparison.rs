@@ -42,7 +42,7 @@ const PASCAL: [[f64; MAX_RELATIVE_DEGREE + 1]; MAX_RELATIVE_DEGREE + 1] = {
 /// # Panics
 ///
 /// If n or k is above [`MAX_RELATIVE_DEGREE`].
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 pub fn binomial(n: usize, k: usize) -> f64 {
     PASCAL[n][k]
 }
@@ -55,7 +55,7 @@ pub fn factorial(k: usize) -> f64 {
 
 /// The part of (D + a)ⁿ e below the highest derivative: Σ_{j<n} C(n, j) a^{n−j} e⁽ʲ⁾, where
 /// `e` holds e⁽⁰⁾ … e⁽ⁿ⁻¹⁾ and its length is n.
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 pub fn lower_terms(rate: f64, e: &[f64]) -> f64 {
     let (n, mut sum) = (e.len(), 0.0);
     for j in 0..n {
@@ -65,7 +65,7 @@ pub fn lower_terms(rate: f64, e: &[f64]) -> f64 {
 }
 
 /// A_k = k! c_k = Σ_{j≤k} C(k, j) a^{k−j} e⁽ʲ⁾(0) for `k` below the length of `e`.
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 pub(super) fn scaled_coefficient(rate: f64, e: &[f64], k: usize) -> f64 {
     let mut sum = 0.0;
     for j in 0..k + 1 {

@@ -45,7 +45,7 @@ pub struct Sample<'a> {
 
 impl<'a> Sample<'a> {
     /// A sample `elapsed` s after the anchor; everything else has its default.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub fn new(anchor: &'a [f64], deadline: f64, elapsed: f64, e: &'a [f64]) -> Self {
         Self {
             anchor,
@@ -62,7 +62,7 @@ impl<'a> Sample<'a> {
     }
 
     /// Whether the deadline lies after the anchor.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn has_time(&self) -> bool {
         self.deadline > 0.0
     }
@@ -73,7 +73,7 @@ impl<'a> Sample<'a> {
     }
 
     /// The time in s until the deadline, at least `period`.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn time_left(&self, period: f64) -> f64 {
         (self.deadline - self.elapsed).max(period)
     }

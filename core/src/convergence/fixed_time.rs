@@ -252,7 +252,7 @@ impl FixedTime {
     }
 
     /// The floor under h⁽ⁿ⁾ and the bound on h of the condition in force. Records in `state` whether its theorem applies.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn enforce<const N: usize>(
         &self,
         state: &mut FixedTimeState,
@@ -284,13 +284,13 @@ impl FixedTime {
     }
 
     /// Whether the stay constraint takes over inside.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn hands_over(&self) -> bool {
         self.approach.abilities().hands_over
     }
 
     /// Whether the stay constraint is in force.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn keeps(&self, state: &FixedTimeState) -> bool {
         state.phase.keeps() && self.hands_over()
     }

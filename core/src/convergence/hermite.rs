@@ -23,7 +23,7 @@ pub struct Hermite;
 
 impl Hermite {
     /// [`Profile::evaluate`] for n = `N`.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn of_degree<const N: usize>(anchor: &[f64; N], deadline: f64, elapsed: f64) -> Derivatives {
         let n = N;
         let mut r = [0.0; MAX_RELATIVE_DEGREE + 1];
@@ -66,7 +66,7 @@ impl Hermite {
 
 impl Profile for Hermite {
     /// Entries above n are 0.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn evaluate(&self, anchor: &[f64], deadline: f64, elapsed: f64) -> Derivatives {
         const { assert!(MAX_RELATIVE_DEGREE <= 8, "the degrees below") };
         // With n known to the compiler the short loops unroll.

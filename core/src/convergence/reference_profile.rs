@@ -59,7 +59,7 @@ impl ReferenceProfile {
     }
 
     /// Π (D + a_i) e without its highest derivative.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn lower_terms(&self, rate: f64, e: &[f64]) -> f64 {
         match &self.rates {
             Some(rates) => rates.lower_terms(e),
@@ -77,7 +77,7 @@ impl ReferenceProfile {
 }
 
 impl Condition for ReferenceProfile {
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn bound(&self, at: &Sample) -> Bound {
         let n = at.e.len();
         let r = self.profile(at, at.elapsed);
@@ -126,12 +126,12 @@ impl Condition for ReferenceProfile {
         profile::check(&**own, at.anchor, at.deadline).err().map(Refusal::Profile)
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn rates(&self, at: &Sample) -> Option<Rates> {
         Some(self.rates.map_or(Rates::Repeated(at.rate), Rates::Each))
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn profile(&self, at: &Sample, elapsed: f64) -> Derivatives {
         match (&self.own, self.kind) {
             _ if !at.has_time() => [0.0; MAX_RELATIVE_DEGREE + 1],

@@ -234,7 +234,7 @@ pub struct RepeatedRoot;
 const MARGIN_TOLERANCE: f64 = 1e-12;
 
 impl Condition for RepeatedRoot {
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn bound(&self, at: &Sample) -> Bound {
         // The e to which the constraint, active from here on, leads at the deadline: errors grow with a negative rate.
         let ahead = lower_bound(at.rate, at.e, at.time_left(0.0));

@@ -68,7 +68,7 @@ impl PeriodBound {
 
     /// The bound as a row on h⁽ⁿ⁾, divided by `divisor`: from h⁽ᵏ⁾ at the end of the period, k < n, and their gradients with
     /// respect to `inputs` inputs.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub fn weighted(
         &self,
         value: &[f64],
@@ -204,7 +204,7 @@ struct Cascade {
 }
 
 impl Cascade {
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn of(rates: &Rates, n: usize, time_left: f64) -> Self {
         match *rates {
             Rates::Each(rates) => {

@@ -108,7 +108,7 @@ impl FixedTimeState {
     }
 
     /// The sample as the method of the approach sees it, with `e` = h − `margin` and its derivatives.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn on_approach<'a>(&'a self, elapsed: f64, e: &'a [f64], errors: &'a [f64]) -> Sample<'a> {
         Sample {
             margin: self.margin,
@@ -121,7 +121,7 @@ impl FixedTimeState {
     }
 
     /// The sample as the stay constraint sees it, with `e` = h − `stay_margin` and its derivatives.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn on_stay<'a>(&'a self, elapsed: f64, e: &'a [f64]) -> Sample<'a> {
         Sample {
             margin: self.stay_margin,

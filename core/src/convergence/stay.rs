@@ -35,7 +35,7 @@ use crate::elementary;
 
 /// Whether the stay constraint with `rate` > 0 keeps e ≥ 0 for ever from the derivatives `e`
 /// (e⁽⁰⁾ … e⁽ⁿ⁻¹⁾): all A_k ≥ 0.
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 pub fn is_invariant(rate: f64, e: &[f64]) -> bool {
     let mut all = true;
     for k in 0..e.len() {
@@ -267,7 +267,7 @@ impl Stay<'_> {
 }
 
 impl Condition for Stay<'_> {
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn bound(&self, at: &Sample) -> Bound {
         Bound { floor: at.pull - lower_terms(at.rate, at.e), lower: 0.0, applies: at.on_course }
     }

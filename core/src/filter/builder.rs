@@ -6,8 +6,13 @@ use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use super::rows::{self, BarrierSlot, MeasurementErrors, Rows, Scratch, SharedPlants, Workspace};
-use super::{BarrierSettings, Begin, End, Filter, FilterState, MOST_LATE, Report, Sampling, Strictness};
+use super::rows::{
+    self, BarrierSlot, MeasurementErrors, Requirement, Rows, Scratch, SharedPlants, Workspace,
+};
+use super::{
+    BarrierReport, BarrierSettings, Begin, End, Filter, FilterState, MOST_LATE, Report, Sampling, Sent,
+    Strictness,
+};
 use crate::barrier::Barrier;
 use crate::convergence::condition::Condition;
 use crate::convergence::profile::Profile;
@@ -203,6 +208,13 @@ impl<P, const NX: usize, const NU: usize> FilterBuilder<P, NX, NU> {
     #[must_use]
     pub fn measured(mut self, count: usize) -> Self {
         self.parts.measured = count;
+        self
+    }
+
+    /// Makes room for so many barriers in all, where memory is short: they are not moved as more are added.
+    #[must_use]
+    pub fn room_for(mut self, barriers: usize) -> Self {
+        self.parts.slots.reserve_exact(barriers.saturating_sub(self.parts.slots.len()));
         self
     }
 
@@ -443,6 +455,39 @@ pub(super) fn check_deadline(deadline: f64, delay: f64) -> Result<(), Error> {
     }
 }
 
+/// The number of inputs on their way to make room for.
+fn room_for_sent(delay: f64, period: f64) -> usize {
+    if delay > 0.0 { (delay / period).min(MOST_LATE) as usize + 3 } else { 0 }
+}
+
+impl Filter {
+    /// The most bytes that building a filter without integrator, measurement errors and plans allocates, besides its sources:
+    /// for so many barriers and states, a delay with the sampling, and whether the longest period is given.
+    #[doc(hidden)]
+    pub fn memory(
+        (barriers, states): (usize, usize),
+        (delay, sampling): (f64, Sampling),
+        period_max: bool,
+    ) -> usize {
+        /// What an allocation takes beyond its bytes.
+        const ROUNDING: usize = 2 * size_of::<usize>();
+        let period = if let Sampling::Period(period) = sampling { period } else { 0.0 };
+        let sent = room_for_sent(delay, period);
+        let numbers = states * size_of::<f64>() + ROUNDING;
+        let state = barriers * size_of::<FixedTimeState>() + sent * size_of::<Sent>() + 2 * ROUNDING;
+        let row = size_of::<Row>() + size_of::<Enforcement>() + size_of::<Requirement>();
+        let each = size_of::<BarrierSlot>() + size_of::<BarrierReport>() + 2 * numbers;
+        // Plants that share work are listed as they are found: four at first.
+        let plants = 2 * SharedPlants::SIZE * barriers.max(4);
+        size_of::<Self>()
+            + barriers * each
+            + 3 * state
+            + rows::most(barriers, period_max) * row
+            + plants
+            + 12 * ROUNDING
+    }
+}
+
 /// Checks that a source is along a plant of `states` and `inputs`, and depends on no more than the quantities measured
 /// beside them.
 ///
@@ -588,13 +633,13 @@ impl Parts {
         }
         // State and workspace, allocated once: a step does not allocate.
         let barriers = vec![FixedTimeState::default(); slots.len()];
-        let room = if delay > 0.0 { sent.min(MOST_LATE) as usize + 3 } else { 0 };
-        let sent = Vec::with_capacity(room);
+        let sent = Vec::with_capacity(room_for_sent(delay, period));
         let state = FilterState { barriers, sent, ..FilterState::default() };
+        let most_rows = rows::most(slots.len(), period_max > 0.0);
         let workspace = Workspace {
-            rows: vec![Row::ZERO; MAX_ROWS],
-            enforcement: vec![Enforcement::Hard { priority: 0 }; MAX_ROWS],
-            requirements: Vec::with_capacity(MAX_ROWS),
+            rows: vec![Row::ZERO; most_rows],
+            enforcement: vec![Enforcement::Hard { priority: 0 }; most_rows],
+            requirements: Vec::with_capacity(most_rows),
             next: state.clone(),
             scratch: vec![0.0; state_dim],
             report: Report::new(slots.len()),

@@ -203,7 +203,7 @@ impl BarrierReport {
     };
 
     /// Writes the report before the QP is solved.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn begin(
         &mut self,
         promise: &FixedTimeState,

@@ -178,7 +178,7 @@ impl FilterState {
     }
 
     /// Takes over `next` except for the plan; `next` keeps only its memory.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn take_rows(&mut self, next: &mut Self) {
         core::mem::swap(&mut self.barriers, &mut next.barriers);
         core::mem::swap(&mut self.sent, &mut next.sent);

@@ -37,7 +37,7 @@ macro_rules! derived_operators {
         impl<$($generics)*> num_traits::Zero for $type {
             #[inline]
             fn zero() -> Self { Self::from(0.0) }
-            #[inline(always)]
+            #[cfg_attr(not(feature = "small"), inline(always))]
             fn is_zero(&self) -> bool { *self == Self::from(0.0) }
         }
         impl<$($generics)*> num_traits::One for $type {

@@ -32,13 +32,13 @@ pub(crate) struct Response<const M: usize, const K: usize> {
 
 impl<const M: usize, const K: usize> Response<M, K> {
     /// A series that no input reaches.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(crate) fn unforced(series: Taylor<f64, K>) -> Self {
         Self { series, gradient: [[0.0; M]; K] }
     }
 
     /// Time itself at `t`: `t + τ`.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(crate) fn time(t: f64) -> Self {
         Self::unforced(Taylor::time(t))
     }
@@ -48,7 +48,7 @@ impl<const M: usize, const K: usize> Response<M, K> {
     /// # Panics
     ///
     /// If `k` ≥ `K`.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(crate) fn coefficient(&self, k: usize) -> (f64, [f64; M]) {
         (self.series.coefficients[k], if k == 0 { [0.0; M] } else { self.gradient[k] })
     }
@@ -58,7 +58,7 @@ impl<const M: usize, const K: usize> Response<M, K> {
     /// # Panics
     ///
     /// If `k` is 0 or ≥ `K`.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(crate) fn set_coefficient(&mut self, k: usize, (value, gradient): (f64, [f64; M])) {
         assert!(k > 0, "the start does not depend on the inputs");
         self.series.coefficients[k] = value;
@@ -66,7 +66,7 @@ impl<const M: usize, const K: usize> Response<M, K> {
     }
 
     /// The first `J` ≤ `K` coefficients.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(crate) fn truncated<const J: usize>(&self) -> Response<M, J> {
         Response {
             series: Taylor { coefficients: from_fn(|k| self.series.coefficients[k]) },
@@ -75,13 +75,13 @@ impl<const M: usize, const K: usize> Response<M, K> {
     }
 
     /// A gradient from its coefficients k ≥ 1, of components m.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn gradient(coefficient: impl Fn(usize, usize) -> f64) -> Gradient<M, K> {
         from_fn(|k| from_fn(|m| if k == 0 { 0.0 } else { coefficient(k, m) }))
     }
 
     /// Coefficient `k` ≥ 1 of a' b, component `m`.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn product(gradient: &Gradient<M, K>, b: &Taylor<f64, K>, k: usize, m: usize) -> f64 {
         let mut sum = gradient[k][m] * b.coefficients[0];
         for i in 1..k {
@@ -91,14 +91,14 @@ impl<const M: usize, const K: usize> Response<M, K> {
     }
 
     /// φ(a) from the series of φ(a) and φ'(a); the last coefficient of the latter is not used.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn chain(&self, series: Taylor<f64, K>, slope: Taylor<f64, K>) -> Self {
         Self { series, gradient: Self::gradient(|k, m| Self::product(&self.gradient, &slope, k, m)) }
     }
 }
 
 impl<const M: usize, const K: usize> From<f64> for Response<M, K> {
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn from(value: f64) -> Self {
         Self::unforced(Taylor::from(value))
     }
@@ -106,7 +106,7 @@ impl<const M: usize, const K: usize> From<f64> for Response<M, K> {
 
 impl<const M: usize, const K: usize> Neg for Response<M, K> {
     type Output = Self;
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn neg(self) -> Self {
         Self { series: -self.series, gradient: Self::gradient(|k, m| -self.gradient[k][m]) }
     }
@@ -114,7 +114,7 @@ impl<const M: usize, const K: usize> Neg for Response<M, K> {
 
 impl<const M: usize, const K: usize> Add for Response<M, K> {
     type Output = Self;
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn add(self, other: Self) -> Self {
         let gradient = Self::gradient(|k, m| self.gradient[k][m] + other.gradient[k][m]);
         Self { series: self.series + other.series, gradient }
@@ -123,7 +123,7 @@ impl<const M: usize, const K: usize> Add for Response<M, K> {
 
 impl<const M: usize, const K: usize> Sub for Response<M, K> {
     type Output = Self;
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn sub(self, other: Self) -> Self {
         let gradient = Self::gradient(|k, m| self.gradient[k][m] - other.gradient[k][m]);
         Self { series: self.series - other.series, gradient }
@@ -132,7 +132,7 @@ impl<const M: usize, const K: usize> Sub for Response<M, K> {
 
 impl<const M: usize, const K: usize> Mul for Response<M, K> {
     type Output = Self;
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn mul(self, other: Self) -> Self {
         let gradient = Self::gradient(|k, m| {
             Self::product(&self.gradient, &other.series, k, m)
@@ -144,7 +144,7 @@ impl<const M: usize, const K: usize> Mul for Response<M, K> {
 
 impl<const M: usize, const K: usize> Div for Response<M, K> {
     type Output = Self;
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn div(self, other: Self) -> Self {
         let series = self.series / other.series;
         let rest = Self::gradient(|k, m| self.gradient[k][m] - Self::product(&other.gradient, &series, k, m));
@@ -155,7 +155,7 @@ impl<const M: usize, const K: usize> Div for Response<M, K> {
 
 impl<const M: usize, const K: usize> Add<f64> for Response<M, K> {
     type Output = Self;
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn add(self, other: f64) -> Self {
         Self { series: self.series + other, ..self }
     }
@@ -163,7 +163,7 @@ impl<const M: usize, const K: usize> Add<f64> for Response<M, K> {
 
 impl<const M: usize, const K: usize> Sub<f64> for Response<M, K> {
     type Output = Self;
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn sub(self, other: f64) -> Self {
         Self { series: self.series - other, ..self }
     }
@@ -171,7 +171,7 @@ impl<const M: usize, const K: usize> Sub<f64> for Response<M, K> {
 
 impl<const M: usize, const K: usize> Mul<f64> for Response<M, K> {
     type Output = Self;
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn mul(self, other: f64) -> Self {
         Self { series: self.series * other, gradient: Self::gradient(|k, m| self.gradient[k][m] * other) }
     }
@@ -179,7 +179,7 @@ impl<const M: usize, const K: usize> Mul<f64> for Response<M, K> {
 
 impl<const M: usize, const K: usize> Div<f64> for Response<M, K> {
     type Output = Self;
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn div(self, other: f64) -> Self {
         Self { series: self.series / other, gradient: Self::gradient(|k, m| self.gradient[k][m] / other) }
     }
@@ -188,43 +188,43 @@ impl<const M: usize, const K: usize> Div<f64> for Response<M, K> {
 derived_operators!([const M: usize, const K: usize] Response<M, K>);
 
 impl<const M: usize, const K: usize> Scalar for Response<M, K> {
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn value(self) -> f64 {
         self.series.value()
     }
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn sqrt(self) -> Self {
         let root = self.series.sqrt();
         self.chain(root, Taylor::from(0.5) / root)
     }
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn exp(self) -> Self {
         let value = self.series.exp();
         self.chain(value, value)
     }
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn ln(self) -> Self {
         self.chain(self.series.ln(), Taylor::from(1.0) / self.series)
     }
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn sin_cos(self) -> (Self, Self) {
         let (sin, cos) = self.series.sin_cos();
         (self.chain(sin, cos), self.chain(cos, -sin))
     }
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn atan(self) -> Self {
         self.chain(self.series.atan(), Taylor::from(1.0) / (self.series.squared() + 1.0))
     }
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn tanh(self) -> Self {
         let value = self.series.tanh();
         self.chain(value, -value.squared() + 1.0)
     }
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn powf(self, exponent: f64) -> Self {
         self.chain(self.series.powf(exponent), self.series.powf(exponent - 1.0) * exponent)
     }
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn squared(self) -> Self {
         let gradient = Self::gradient(|k, m| 2.0 * Self::product(&self.gradient, &self.series, k, m));
         Self { series: self.series.squared(), gradient }

@@ -96,7 +96,7 @@ const MIDDLE: f64 = 3.0;
 const COUNTS: f64 = 1e6;
 
 /// Whether the rates at the four stages of a Runge-Kutta step, state by state, are curved so little that one step suffices.
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 pub fn is_even<S: Scalar>([k1, k2, k3, k4]: [&[S]; 4]) -> bool {
     let (mut most, mut largest) = (0.0_f64, 0.0_f64);
     for (((k1, k2), k3), k4) in k1.iter().zip(k2).zip(k3).zip(k4) {
@@ -110,7 +110,7 @@ pub fn is_even<S: Scalar>([k1, k2, k3, k4]: [&[S]; 4]) -> bool {
 
 /// The rates of the states as numbers that carry derivatives along u: f(x) + g(x) u, by the product rule. `x` carries its
 /// own.
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 fn rate<P, const NX: usize, const NU: usize>(plant: &P, x: &[Dual<NU>; NX], u: &[f64; NU]) -> [Dual<NU>; NX]
 where
     P: ControlAffine<NX, NU>,
@@ -135,7 +135,7 @@ where
 }
 
 /// The stages of one Runge-Kutta step of `duration`, from the first on.
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 fn stages<S, const NX: usize>(
     rate: &impl Fn(&[S; NX]) -> [S; NX],
     x: &[S; NX],
@@ -159,7 +159,7 @@ where
 }
 
 /// The state after the Runge-Kutta step of those stages.
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 fn stepped<S, const NX: usize>(x: &[S; NX], [k1, k2, k3, k4]: &[[S; NX]; 4], duration: f64) -> [S; NX]
 where
     S: Scalar,
@@ -173,7 +173,7 @@ where
 
 /// The state `duration` seconds after `x`, at which the rate is `k1`: by one Runge-Kutta step if that suffices, otherwise by
 /// [`SUBSTEPS`].
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 fn run<S, const NX: usize>(
     rate: impl Fn(&[S; NX]) -> [S; NX],
     x: &[S; NX],
@@ -256,7 +256,7 @@ where
 }
 
 /// The series of the states from `x` under the held input `u`, `K` coefficients.
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 fn series<P, S, const NX: usize, const NU: usize, const K: usize>(
     plant: &P,
     x: &[S; NX],
@@ -340,7 +340,7 @@ where
 }
 
 /// The first `K` coefficients of the expansions of the states.
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 fn first_over<const NX: usize, const K: usize>(path: &[ExpansionOver]) -> [Taylor<Interval, K>; NX] {
     from_fn(|i| Taylor { coefficients: from_fn(|k| path[i][k]) })
 }
@@ -387,7 +387,7 @@ where
 }
 
 /// Time as an expansion that starts anywhere in `time`.
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 fn time_over<const K: usize>(time: Interval) -> Taylor<Interval, K> {
     let mut expansion = Taylor::time(0.0);
     expansion.coefficients[0] = time;
@@ -431,7 +431,7 @@ where
 }
 
 /// The series of the states from [`arrival`] under the held input `u`, `K` coefficients, with their derivatives along u.
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 pub(super) fn motion<P, const NX: usize, const NU: usize, const K: usize>(
     plant: &P,
     x: &[f64; NX],
@@ -447,7 +447,7 @@ where
 }
 
 /// Evaluates (4) for `barrier` at time `t` along the [`motion`] from there, for k < `K`. Leaves the rest of `out` as it is.
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 pub(super) fn evaluate<B, const NX: usize, const NU: usize, const K: usize>(
     barrier: &B,
     t: f64,

@@ -11,7 +11,7 @@ const TRIALS: u32 = 8;
 /// A box that contains x + \[0, dt\] ẋ(box) contains the path (Picard and Lindelöf).
 ///
 /// Source: R. E. Moore, R. B. Kearfott and M. J. Cloud, *Introduction to Interval Analysis*, SIAM (2009), section 10.4.
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 pub fn enclose(
     x: &[f64],
     dt: f64,
@@ -45,7 +45,7 @@ pub fn enclose(
 
 /// The greater of two lower bounds on a quantity that begins at `h`, has its values from `low` up and its rate in `slope`
 /// for `dt` s. The second follows from the mean value theorem, and is greater if much of what moves h cancels.
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 pub fn sharper(low: f64, h: f64, slope: Interval, dt: f64) -> f64 {
     let risen = h + dt * slope.low.min(0.0);
     // NaN is not a bound.

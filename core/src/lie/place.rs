@@ -17,7 +17,7 @@ impl Place {
     }
 
     /// The component of own state `i`.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn component(self, i: usize) -> usize {
         if i < self.split { i } else { self.first + (i - self.split) }
     }
@@ -28,7 +28,7 @@ impl Place {
     }
 
     /// The own states.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn take<T: Copy, const N: usize>(self, x: &[T]) -> [T; N] {
         match self {
             Self::START => *x.first_chunk().expect("a number for each component"),
@@ -37,13 +37,13 @@ impl Place {
     }
 
     /// The own states if the last four are `point`, and the others those of the plant.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn beside<T: Copy, const N: usize>(x: &[T], point: &[T; 4]) -> [T; N] {
         core::array::from_fn(|i| if i + 4 < N { x[i] } else { point[i + 4 - N] })
     }
 
     /// The result of `read` on the own states.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn read<T: Copy, R, const N: usize>(self, x: &[T], read: impl Fn(&[T]) -> R) -> R {
         match self {
             Self::START => read(&x[..N]),
@@ -52,7 +52,7 @@ impl Place {
     }
 
     /// Writes the own states.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn put<T: Copy, const N: usize>(self, own: &[T; N], x: &mut [T]) {
         match self {
             Self::START => x[..N].copy_from_slice(own),

@@ -44,7 +44,7 @@ impl<const N: usize> Factors<N> {
     }
 
     /// Splits `normal`, of length `norm`, into its parts inside and outside the span.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn project(&self, normal: &[f64; N], norm: f64) -> Projection<N> {
         let mut p = Projection { inside: [0.0; N], outside: *normal, square: norm * norm };
         if self.len == 0 {
@@ -79,7 +79,7 @@ impl<const N: usize> Factors<N> {
     }
 
     /// Appends the normal whose projection is `p`; its `square` is not 0.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn append(&mut self, p: &Projection<N>) {
         let k = self.len;
         let length = elementary::sqrt(p.square);
@@ -117,7 +117,7 @@ impl<const N: usize> Factors<N> {
     }
 
     /// Solves R r = d in place.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn solve(&self, d: &mut [f64; N]) {
         for k in (0..self.len).rev() {
             d[k] *= self.inverse[k];

@@ -61,7 +61,7 @@ impl Row {
     pub const ZERO: Self = Self { normal: [0.0; MAX_INPUTS], floor: 0.0 };
 
     /// The linear function with the `value` and the gradient `normal` at `u`, as a row.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(crate) fn linear<const M: usize>(normal: &[f64; M], value: f64, u: &[f64; M]) -> Self {
         let mut row = Self::ZERO;
         row.normal[..M].copy_from_slice(normal);
@@ -146,7 +146,7 @@ impl Bounds {
     }
 
     /// [`Self::contain`], unrolled.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(crate) fn contain_all<const M: usize>(&self, u: &[f64; M]) -> bool {
         let mut all = true;
         for i in 0..M {
@@ -272,8 +272,11 @@ pub struct Active {
 #[derive(Clone)]
 pub struct Workspace {
     // The method for the number of inputs, rounded up. For two inputs it takes a third of the time of the last one.
+    #[cfg(not(feature = "small"))]
     two: DualActiveSet<2>,
+    #[cfg(not(feature = "small"))]
     four: DualActiveSet<4>,
+    #[cfg(not(feature = "small"))]
     twelve: DualActiveSet<12>,
     any: DualActiveSet<MAX_INPUTS>,
     active: [Active; MAX_ROWS + MAX_INPUTS],
@@ -292,8 +295,11 @@ impl Workspace {
     /// A workspace for any problem.
     pub const fn new() -> Self {
         Self {
+            #[cfg(not(feature = "small"))]
             two: DualActiveSet::EMPTY,
+            #[cfg(not(feature = "small"))]
             four: DualActiveSet::EMPTY,
+            #[cfg(not(feature = "small"))]
             twelve: DualActiveSet::EMPTY,
             any: DualActiveSet::EMPTY,
             active: [Active { constraint: Constraint::Row(0), multiplier: 0.0 }; MAX_ROWS + MAX_INPUTS],
@@ -345,7 +351,9 @@ impl Workspace {
             return Solution { outcome, solver: Solver::ClosedForm, iterations: 0 };
         }
         // Several: from the guess, else by the dual active-set method.
-        let Self { two, four, twelve, any, active, active_len, relaxed, ill_conditioned, .. } = self;
+        #[cfg(not(feature = "small"))]
+        let Self { two, four, twelve, .. } = self;
+        let Self { any, active, active_len, relaxed, ill_conditioned, .. } = self;
         let (outcome, iterations);
         macro_rules! solve_with {
             ($method:ident, $n:expr) => {{
@@ -366,8 +374,11 @@ impl Workspace {
             }};
         }
         match u.len() {
+            #[cfg(not(feature = "small"))]
             ..=2 => solve_with!(two, 2),
+            #[cfg(not(feature = "small"))]
             3..=4 => solve_with!(four, 4),
+            #[cfg(not(feature = "small"))]
             5..=12 => solve_with!(twelve, 12),
             _ => solve_with!(any, MAX_INPUTS),
         }

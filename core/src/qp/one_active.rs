@@ -92,7 +92,7 @@ fn solve_for<const M: usize>(p: &Problem, u: &mut [f64]) -> Option<Answer> {
 }
 
 /// The sum of M terms, unrolled.
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 fn sum<const M: usize>(term: impl Fn(usize) -> f64) -> f64 {
     let mut sum = 0.0;
     for i in 0..M {
@@ -102,7 +102,7 @@ fn sum<const M: usize>(term: impl Fn(usize) -> f64) -> f64 {
 }
 
 /// [`Row::slack`].
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 fn slack_at<const M: usize>(row: &Row, u: &[f64; M]) -> f64 {
     sum::<M>(|i| row.normal[i] * u[i]) - row.floor
 }

@@ -46,25 +46,25 @@ impl RowSet {
     }
 
     /// Whether row `i` is one of them.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub const fn contains(self, i: usize) -> bool {
         i < MAX_ROWS && self.0 >> i & 1 == 1
     }
 
     /// Adds row `i`.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub fn insert(&mut self, i: usize) {
         self.0 |= 1 << i;
     }
 
     /// Takes row `i` out.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub fn remove(&mut self, i: usize) {
         self.0 &= !(1 << i);
     }
 
     /// The rows, in the order of their numbers.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub fn iter(self) -> impl Iterator<Item = usize> {
         let Self(mut bits) = self;
         core::iter::from_fn(move || {
@@ -77,7 +77,7 @@ impl RowSet {
     }
 
     /// The rows of `0..count` for which `f` is true.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub fn with(count: usize, f: impl Fn(usize) -> bool) -> Self {
         (0..count).fold(Self::EMPTY, |Self(bits), i| Self(bits | Bits::from(f(i)) << i))
     }
@@ -86,14 +86,14 @@ impl RowSet {
 impl BitOr for RowSet {
     type Output = Self;
 
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn bitor(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 }
 
 impl BitOrAssign for RowSet {
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn bitor_assign(&mut self, other: Self) {
         self.0 |= other.0;
     }
@@ -102,7 +102,7 @@ impl BitOrAssign for RowSet {
 impl BitAnd for RowSet {
     type Output = Self;
 
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn bitand(self, other: Self) -> Self {
         Self(self.0 & other.0)
     }
@@ -112,7 +112,7 @@ impl BitAnd for RowSet {
 impl Sub for RowSet {
     type Output = Self;
 
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn sub(self, other: Self) -> Self {
         Self(self.0 & !other.0)
     }

@@ -121,9 +121,9 @@ impl MixedDegree<'_> {
 }
 
 impl Adding<'_> {
-    /// The states that are the position of the barrier, on a plant of expressions.
-    pub(super) fn own_position(&self) -> Option<&[String]> {
-        Some(&self.section().position[..]).filter(|position| !position.is_empty())
+    /// The states that are the position of the barrier, on a plant of expressions; empty of a barrier without one.
+    pub(super) fn own_position(&self) -> &[String] {
+        &self.section().position
     }
 
     /// Whether the plant is one of expressions.

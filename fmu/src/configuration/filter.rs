@@ -632,7 +632,40 @@ impl FilterConfiguration {
         Ok(self)
     }
 
-    fn sampling(&self, step_size: f64) -> Sampling {
+    /// What becomes of barrier `index` where not all can be met.
+    pub(super) fn strictness(&self, index: usize) -> Result<Strictness, ConfigurationError> {
+        let section = &self.barrier[index];
+        match (section.penalty, section.priority) {
+            (Some(_), Some(_)) => {
+                let message = "belongs to hard barriers, this one has a penalty";
+                Err(ConfigurationError::new(format!("barrier[{index}].priority"), message))
+            }
+            (Some(penalty), None) => Ok(Strictness::Soft(penalty)),
+            (None, Some(priority)) => Ok(Strictness::Priority(priority)),
+            (None, None) => Ok(Strictness::KeepFirst),
+        }
+    }
+
+    /// `[min, max]` of each input of the plant, infinite where there is no bound.
+    pub(super) fn input_bounds(&self) -> Result<Vec<[f64; 2]>, ConfigurationError> {
+        let mut all = Vec::new();
+        for input in self.plant.inputs() {
+            let [low, high] = self.bounds.get(&input.name).copied().unwrap_or([-UNBOUNDED, UNBOUNDED]);
+            if low > high {
+                let message = format!(
+                    "is [{low}, {high}], must be [min, max] with min <= max (in an FMU: u_min.{name}, u_max.{name})",
+                    name = input.name
+                );
+                return Err(ConfigurationError::new(format!("bounds.{}", input.name), message));
+            }
+            let min = if low <= -UNBOUNDED { f64::NEG_INFINITY } else { low };
+            let max = if high >= UNBOUNDED { f64::INFINITY } else { high };
+            all.push([min, max]);
+        }
+        Ok(all)
+    }
+
+    pub(super) fn sampling(&self, step_size: f64) -> Sampling {
         match self.sampling {
             SamplingName::Pointwise => Sampling::Pointwise,
             SamplingName::Measured => Sampling::Measured { first: Some(step_size) },
@@ -671,34 +704,15 @@ impl FilterConfiguration {
                 mixed_degree,
             })?;
             let (begin, end) = self.window(i)?;
-            let strictness = match (section.penalty, section.priority) {
-                (Some(_), Some(_)) => {
-                    let message = "belongs to hard barriers, this one has a penalty";
-                    return Err(ConfigurationError::new(format!("barrier[{i}].priority"), message));
-                }
-                (Some(penalty), None) => Strictness::Soft(penalty),
-                (None, Some(priority)) => Strictness::Priority(priority),
-                (None, None) => Strictness::KeepFirst,
-            };
+            let strictness = self.strictness(i)?;
             builder = builder
                 .window(begin, end)
                 .and_then(|b| b.strictness(strictness))
                 .map_err(|e| self.refused(i, &e))?;
         }
         // The bounds of the inputs, and the errors of the measurements.
-        let (mut min, mut max) = (Vec::new(), Vec::new());
-        for input in inputs {
-            let [low, high] = self.bounds.get(&input.name).copied().unwrap_or([-UNBOUNDED, UNBOUNDED]);
-            if low > high {
-                let message = format!(
-                    "is [{low}, {high}], must be [min, max] with min <= max (in an FMU: u_min.{name}, u_max.{name})",
-                    name = input.name
-                );
-                return Err(ConfigurationError::new(format!("bounds.{}", input.name), message));
-            }
-            min.push(if low <= -UNBOUNDED { f64::NEG_INFINITY } else { low });
-            max.push(if high >= UNBOUNDED { f64::INFINITY } else { high });
-        }
+        let (min, max): (Vec<f64>, Vec<f64>) =
+            self.input_bounds()?.into_iter().map(|[min, max]| (min, max)).unzip();
         let errors = match is_for_plans && self.leaves_errors_to_plans() {
             true => vec![0.0; states + self.barrier_inputs().len()],
             false => self.errors(),
@@ -794,7 +808,7 @@ impl FilterConfiguration {
     }
 
     /// The conditions under which barrier `index` begins and ceases to be enforced.
-    fn window(&self, index: usize) -> Result<(Begin, End), ConfigurationError> {
+    pub(super) fn window(&self, index: usize) -> Result<(Begin, End), ConfigurationError> {
         let section = &self.barrier[index];
         let refuse = |field: &str, message: String| {
             Err(ConfigurationError::new(format!("barrier[{index}].{field}"), message))

@@ -12,6 +12,7 @@ mod assurance;
 mod barrier;
 mod controller;
 mod deviation;
+mod embedded;
 mod external;
 mod file_kind;
 mod filter;

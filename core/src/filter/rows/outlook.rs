@@ -27,7 +27,7 @@ pub(super) struct Outlook<'a> {
 
 /// The interval (s after the sample at `t`) on which a promise requires h ≥ 0 while an input is held for `hold` s, if there
 /// is one. In a set that is kept, the hold may last as long as `long` (s).
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 pub(super) fn span(promise: &FixedTimeState, t: f64, [hold, long]: [f64; 2]) -> Option<[f64; 2]> {
     match promise.phase {
         Phase::Stay => Some([0.0, long]),
@@ -42,7 +42,7 @@ pub(super) fn span(promise: &FixedTimeState, t: f64, [hold, long]: [f64; 2]) -> 
 
 impl Outlook<'_> {
     /// h⁽ʲ⁾ `s` seconds later by the Taylor polynomial of order `n` of h, with h⁽ⁿ⁾ = `highest`.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn forecast(&self, n: usize, j: usize, highest: f64, s: f64) -> f64 {
         // Horner's scheme.
         (j..n).rev().fold(highest, |sum, k| self.drift[k] + sum * s / (k + 1 - j) as f64)
@@ -54,7 +54,7 @@ impl Outlook<'_> {
     }
 
     /// The most by which the terms of that polynomial after the first can move h.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn moved<const N: usize>(&self, highest: f64, s: f64) -> f64 {
         let (mut power, mut sum) = (1.0, 0.0);
         for k in 1..=N {
@@ -125,7 +125,7 @@ impl Outlook<'_> {
     /// enclosures. They count as such if known earlier ones are, provided that the error grows with the power n + 1 of the
     /// time. With n = 1, a set that moves faster than the samples shows in no derivative that is known here; a turn by
     /// radians shows at the end of the hold.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn agrees<const N: usize>(&self, held: &Hold, highest: f64, h: f64, hold: f64) -> bool {
         if N == 1 {
             return false;
@@ -142,7 +142,7 @@ impl Outlook<'_> {
     }
 
     /// Whether `derivatives` of h are as predicted `s` seconds later, up to an effect on h of `allowed`.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn is_near<const N: usize>(&self, derivatives: &[f64], s: f64, highest: f64, allowed: f64) -> bool {
         let mut power = 1.0;
         derivatives.iter().enumerate().all(|(k, h)| {

@@ -13,6 +13,12 @@ use crate::{MAX_INPUTS, MAX_ROWS};
 /// How many times at most a sample adds the instants at which its answer breaks a promise, and is solved again.
 const ROUNDS: u32 = 3;
 
+/// The most rows of a sample: for each barrier one, one at the longest step if that is `given`, and one for each time that
+/// instants are added.
+pub(crate) fn most(barriers: usize, given: bool) -> usize {
+    (barriers * (1 + usize::from(given) + ROUNDS as usize)).min(MAX_ROWS)
+}
+
 /// Steps that search widely for an input if they do not meet a constraint: the first 8 in a row, then every 16th.
 const WIDE: (u32, u32) = (8, 16);
 

@@ -202,7 +202,7 @@ impl Linearised<'_> {
 }
 
 /// The length of the vector of these components.
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 fn norm(components: impl Iterator<Item = f64> + Clone) -> f64 {
     /// Squares in this range neither overflow nor lose digits.
     const SQUARES: core::ops::Range<f64> = 1e-250..1e250;
@@ -248,7 +248,7 @@ impl PeriodProblem<'_> {
     ) -> Option<Solution> {
         // With two inputs, as most vehicles have, known to the compiler the short loops unroll.
         match u {
-            [a, b] => {
+            [a, b] if MAX_INPUTS > 4 => {
                 let mut two = [*a, *b];
                 let solution = self.solve_for::<2>(rows, last, scratch, qp, &mut two);
                 (*a, *b) = (two[0], two[1]);
@@ -259,7 +259,7 @@ impl PeriodProblem<'_> {
     }
 
     /// [`Self::solve`] for at most `N` inputs.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn solve_for<const N: usize>(
         &self,
         rows: &mut [Row],
@@ -403,7 +403,7 @@ impl PeriodProblem<'_> {
         RowSet::with(self.enforcement.len(), |i| matches!(self.enforcement[i], Enforcement::Soft { .. }))
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn distance(&self, u: &[f64]) -> f64 {
         norm(u.iter().zip(&self.u_ref[..u.len()]).map(|(v, r)| v - r))
     }
@@ -418,7 +418,7 @@ impl PeriodProblem<'_> {
         }
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn linearise_for(&self, u: &[f64], again: RowSet, at: &mut Linearised) -> Option<()> {
         let Linearised { rows, violations, evaluations, predicted, .. } = at;
         if predicted.input[..u.len()] != *u {
@@ -446,7 +446,7 @@ impl PeriodProblem<'_> {
     }
 
     /// A requirement under the input `u`, as a row on h⁽ⁿ⁾. `None` if there is no prediction.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn weighted(&self, requirement: &Requirement, u: &[f64], room: &mut Evaluations) -> Option<Weighted> {
         let slot = &self.slots[requirement.barrier];
         let Evaluations { ahead, plants } = room;
@@ -456,7 +456,7 @@ impl PeriodProblem<'_> {
     }
 
     /// [`Self::weighted`] without the gradient.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn reached(&self, requirement: &Requirement, u: &[f64], room: &mut Evaluations) -> Option<Weighted> {
         let slot = &self.slots[requirement.barrier];
         let source = slot.source.predict()?;
@@ -467,7 +467,7 @@ impl PeriodProblem<'_> {
     }
 
     /// Writes the row of a requirement linearised at `u`. Returns its violation there in units of its terms.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn linearised(
         &self,
         requirement: &Requirement,
@@ -556,14 +556,14 @@ impl PeriodProblem<'_> {
     /// Whether row `i`, seen from half the way sideways, allows an answer that is nearer to u_ref than `u`. If the rows are
     /// almost affine, or differ little from a quadratic that is curved inwards, the others have to allow it too; otherwise
     /// the plant may turn so far that they do elsewhere.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn is_nearer_sideways(&self, u: &[f64], (i, is_regular): (usize, bool), at: &mut Linearised) -> bool {
         self.look_sideways(u, (i, is_regular), at, |_, _| {})
     }
 
     /// [`Self::is_nearer_sideways`]. For each direction sideways, calls `seen` with how far it went without a nearer answer,
     /// and with the sum of the row's slacks there and on the opposite side.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn look_sideways(
         &self,
         u: &[f64],

@@ -27,7 +27,7 @@ impl Plant {
     }
 
     /// Whether `ahead` is that of the input `u` after `duration`, bit by bit: 0 and −0 are not the same.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn is_ahead_of(&self, u: &[f64], duration: f64) -> bool {
         let mut same = self.duration.is_some_and(|known| known == duration);
         for (known, u) in self.input.iter().zip(u) {
@@ -66,6 +66,9 @@ type Source<'a> = (&'a dyn DerivativeSource, Option<usize>);
 pub(crate) struct SharedPlants(Vec<Plant>);
 
 impl SharedPlants {
+    /// The bytes of one plant.
+    pub(crate) const SIZE: usize = size_of::<Plant>();
+
     /// Finds the plants that the sources of `slots` share, and gives each source the number of its plant.
     pub(crate) fn of(slots: &mut [BarrierSlot]) -> Self {
         let mut plants = Vec::new();
@@ -88,7 +91,7 @@ impl SharedPlants {
     }
 
     /// Starts another sample.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(crate) fn forget(&mut self) {
         for plant in &mut self.0 {
             (plant.is_moving, plant.duration) = (false, None);
@@ -97,7 +100,7 @@ impl SharedPlants {
 
     /// Writes the derivatives of the barrier of a source at time `t` (s) and the state `x`, at which the input of the sample
     /// begins to act.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(crate) fn evaluate(&mut self, source: Source, t: f64, x: &[f64], out: &mut Derivatives) {
         let Some((plant, source)) = self.shared(source) else { return source.0.evaluate(t, x, out) };
         if !plant.is_moving {
@@ -109,7 +112,7 @@ impl SharedPlants {
 
     /// Writes what [`Predict::ahead_of_row`](crate::lie::Predict::ahead_of_row) does for the barrier of `slot`. `None` if
     /// there is no prediction.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(crate) fn ahead_of_row(
         &mut self,
         slot: &BarrierSlot,
@@ -132,7 +135,7 @@ impl SharedPlants {
         Some(())
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn shared<'a>(&mut self, (source, plant): Source<'a>) -> Option<(&mut Plant, &'a dyn SharedPlant)> {
         Some((&mut self.0[plant?], source.shared()?))
     }

@@ -171,7 +171,7 @@ impl<const N: usize> DualActiveSet<N> {
     }
 
     /// Forgets the active rows, for `dim` inputs.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn clear(&mut self, dim: usize) {
         (self.dim, self.len) = (dim, 0);
         (self.saturated, self.active, self.bounds) = (RowSet::EMPTY, RowSet::EMPTY, 0);
@@ -180,7 +180,7 @@ impl<const N: usize> DualActiveSet<N> {
         self.factors.clear(dim);
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn start(&mut self, p: &Problem, u: &[f64]) {
         let n = u.len();
         self.clear(n);
@@ -400,7 +400,7 @@ impl<const N: usize> DualActiveSet<N> {
     }
 
     /// The row or bound that is violated most, by the distance to it.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn most_violated(&mut self, p: &Problem, tolerance: f64) -> Option<Entering<N>> {
         let mut worst: Option<Entering<N>> = None;
         // The distance of the worst, as a fraction.
@@ -444,7 +444,7 @@ impl<const N: usize> DualActiveSet<N> {
     }
 
     /// Row `k` where it is violated by more than `tolerance`; one that vanishes is marked as ill-conditioned.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn row_entering(&mut self, p: &Problem, k: usize, tolerance: f64) -> Option<Entering<N>> {
         if p.rows[k].slack(&self.u) >= 0.0 {
             return None;
@@ -510,7 +510,7 @@ impl<const N: usize> DualActiveSet<N> {
     }
 
     /// Whether the rows have moved u by no more than the correction limit.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn within_limit(&self, p: &Problem) -> bool {
         let moved = |i: usize| self.u[i] - p.bounds.clamp(i, p.u_ref[i]);
         let square: f64 = (0..self.dim).map(|i| moved(i) * moved(i)).sum();

@@ -7,7 +7,7 @@ use crate::elementary::{self, dot};
 
 impl<const N: usize> DualActiveSet<N> {
     /// An empty slot for `constraint`, its normal as δ sees it, and the length of that.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn constraint(&self, p: &Problem, constraint: Constraint) -> (Slot, [f64; N], f64) {
         let mut slot = Slot { constraint, ..Slot::EMPTY };
         let mut norm = 1.0;
@@ -56,7 +56,7 @@ impl<const N: usize> DualActiveSet<N> {
     }
 
     /// The size of the terms of the slack, those at u_ref included, from which u is computed.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn terms(&self, p: &Problem, slot: &Slot) -> f64 {
         let largest = |i: usize| f64::max(self.u[i].abs(), self.u_ref[i].abs());
         match slot.constraint {
@@ -70,7 +70,7 @@ impl<const N: usize> DualActiveSet<N> {
         }
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn join(&mut self, p: &Problem, slot: Slot, projection: &Projection<N>) {
         self.slots[self.len] = slot;
         self.len += 1;
@@ -87,7 +87,7 @@ impl<const N: usize> DualActiveSet<N> {
         self.stale = true;
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn mark(&mut self, constraint: Constraint, active: bool) {
         let toggle = |set: u64, bit: usize| if active { set | 1 << bit } else { set & !(1 << bit) };
         match constraint {

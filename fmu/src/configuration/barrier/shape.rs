@@ -490,13 +490,13 @@ impl Shape {
 
     /// Adds the barrier of this shape to a filter.
     pub(in super::super) fn add(&self, to: Adding<'_>) -> Result<FilterBuilder, ConfigurationError> {
-        if let Some(expression) = to.own_position().and_then(|position| self.expression(position)) {
+        // Where the plant has no name, as the expression that it is.
+        if to.is_own()
+            && let Some(expression) = self.expression(to.own_position(), &[])
+        {
             return to.expression(&expression);
         }
         match self {
-            // Where the plant has no name, as the expression that it is.
-            Self::AtMost { state, bound } if to.is_own() => to.expression(&format!("{bound:?} - {state}")),
-            Self::AtLeast { state, bound } if to.is_own() => to.expression(&format!("{state} - ({bound:?})")),
             Self::Expression { expression, .. } => to.expression(expression),
             Self::Plugin { output, .. } => to.plugin(output),
             Self::External { relative_degree, .. } => to.external(*relative_degree),
@@ -548,9 +548,9 @@ impl Shape {
         })
     }
 
-    /// h as an expression where the states `position` are that, in the order of the axes; `None` of a shape that has no place.
-    /// It equals what the core has for the vehicles with a name.
-    fn expression(&self, position: &[String]) -> Option<String> {
+    /// h as an expression where the states `position` are that, in the order of the axes, and `velocity` the speed or its
+    /// parts; `None` of a shape that is none, or has no place. It equals what the core has for the vehicles with a name.
+    pub(in super::super) fn expression(&self, position: &[String], velocity: &[&str]) -> Option<String> {
         let away = |centre: &[f64]| -> Vec<String> {
             position.iter().zip(centre).map(|(p, c)| format!("({p} - ({c:?}))")).collect()
         };
@@ -604,6 +604,17 @@ impl Shape {
             cuboid(centre, &sizes.iter().map(|size| size * factor).collect::<Vec<_>>(), angle)
         };
         let outside = |h: String| format!("-({h})");
+        match self {
+            Self::AtMost { state, bound } => return Some(format!("{bound:?} - {state}")),
+            Self::AtLeast { state, bound } => return Some(format!("{state} - ({bound:?})")),
+            Self::Expression { expression, .. } => return Some(expression.clone()),
+            Self::SpeedLimit { bound } if !velocity.is_empty() => {
+                let parts: Vec<_> = velocity.iter().map(|part| (*part).to_owned()).collect();
+                return Some(below(&parts, *bound, *bound / 2.0));
+            }
+            _ if position.is_empty() => return None,
+            _ => {}
+        }
         Some(match self {
             Self::Disc { at, radius, smoothing } => round(&away_from(at), *radius, *smoothing),
             Self::Obstacle { at, radius, smoothing } => outside(round(&away_from(at), *radius, *smoothing)),

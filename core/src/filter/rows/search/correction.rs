@@ -28,7 +28,7 @@ type Correction<const N: usize> = ([f64; N], [f64; N], f64);
 
 /// The part of the way back, from a correction's answer to that of the one before, at which the remaining `way` would be
 /// least.
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 fn secant(way: &[f64], before: &[f64]) -> f64 {
     let (mut product, mut square) = (0.0, 0.0);
     for (way, before) in way.iter().zip(before) {
@@ -44,7 +44,7 @@ impl PeriodProblem<'_> {
     /// limit of the QP's answers from u_ref on, each for the rows linearised at the one before. At u_ref the rows are
     /// linearised, except `unseen` ones. `watched` are linearised all along, the others at the end. `None` if the answers do
     /// not converge fast, or others may exist.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn correct<const N: usize>(
         &self,
         u: &mut [f64],
@@ -132,14 +132,14 @@ impl PeriodProblem<'_> {
 
     /// Whether the rows, whose normals turn by the part `ratio` of themselves on the `distance` of `u` from u_ref, are
     /// almost affine there and on the way to `last`, or `last` is no nearer to u_ref.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn is_near(&self, last: &[f64], u: &[f64], distance: f64, ratio: f64) -> bool {
         let near = || distance <= (1.0 + MET) * self.distance(last);
         ratio <= CONTRACTION && (self.is_close(last, u, distance, ratio) || near())
     }
 
     /// Whether the rows are almost affine on the way from `last` to `u`, as for [`Self::is_near`].
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     pub(super) fn is_close(&self, last: &[f64], u: &[f64], distance: f64, ratio: f64) -> bool {
         let away = u.iter().zip(last).fold(0.0, |d: f64, (a, b)| d.max((a - b).abs()));
         ratio * away <= CONTRACTION * distance

@@ -46,7 +46,7 @@ const MULTIPLIER_STEPS: usize = 12;
 /// Number of consecutive samples whose answers continue the previous one without a search for others.
 const GOES_ON: u32 = 8;
 /// The largest number of inputs with which a row is searched with its curvature.
-const INPUTS: usize = 3;
+const INPUTS: usize = if MAX_INPUTS < 3 { MAX_INPUTS } else { 3 };
 
 type Matrix<const M: usize> = [[f64; M]; M];
 
@@ -68,14 +68,14 @@ pub struct Curvature {
 
 impl Curvature {
     /// The second derivatives over a period of that many `seconds`.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn over<const M: usize>(&self, seconds: f64) -> Matrix<M> {
         let at = |i: usize, j: usize| self.hessian[i * (i + 1) / 2 + j];
         core::array::from_fn(|i| core::array::from_fn(|j| seconds * at(i.max(j), i.min(j))))
     }
 
     /// As if `hessian` had been `seconds` times as large.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn write<const M: usize>(&mut self, hessian: &Matrix<M>, seconds: f64) {
         for i in 0..M {
             for j in 0..=i {
@@ -86,7 +86,7 @@ impl Curvature {
 }
 
 /// Σ a_i b_i, unrolled.
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 fn product<const M: usize>(a: &[f64; M], b: &[f64; M]) -> f64 {
     let mut sum = 0.0;
     for i in 0..M {
@@ -96,7 +96,7 @@ fn product<const M: usize>(a: &[f64; M], b: &[f64; M]) -> f64 {
 }
 
 /// The largest component.
-#[inline(always)]
+#[cfg_attr(not(feature = "small"), inline(always))]
 fn largest<const M: usize>(a: &[f64; M]) -> f64 {
     let mut largest = 0.0;
     for i in 0..M {
@@ -114,13 +114,13 @@ struct Bent<const M: usize> {
 
 impl<const M: usize> Bent<M> {
     /// H s.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn turn(&self, s: &[f64; M]) -> [f64; M] {
         core::array::from_fn(|i| product(&self.hessian[i], s))
     }
 
     /// Changes the Hessian as little as possible so that `H s` is the change `y` of the normal.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn learn(&mut self, s: &[f64; M], y: &[f64; M]) {
         let known = self.turn(s);
         let rest: [f64; M] = core::array::from_fn(|i| y[i] - known[i]);
@@ -135,7 +135,7 @@ impl<const M: usize> Bent<M> {
 
     /// Changes the Hessian along a direction sideways of an answer so that the values there and on the opposite side add up
     /// to `values`. Returns whether these are numbers; if not, nothing has been learned.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn learn_sideways(&mut self, way: &[f64], values: f64) -> bool {
         let Some(s) = way.first_chunk::<M>() else { return false };
         let rest = values - product(s, &self.turn(s));
@@ -174,7 +174,7 @@ impl<const M: usize> Bent<M> {
 
     /// The step to the answer of (K), and λ, with u_ref at `back` from here. `None` if an eigenvalue of λH is positive and
     /// not small.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn nearest(&self, back: &[f64; M]) -> Option<([f64; M], f64)> {
         /// The largest square of λH.
         const SMALL: f64 = CONVERGING * CONVERGING;
@@ -227,7 +227,7 @@ struct Resolvent<const M: usize> {
 }
 
 impl<const M: usize> Resolvent<M> {
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn of(hessian: &Matrix<M>, c: &[f64; M]) -> Self {
         let mut of = Self { numerator: [*c; M], determinant: [0.0; M] };
         let mut power = *hessian;
@@ -250,7 +250,7 @@ impl<const M: usize> Resolvent<M> {
     }
 
     /// The vector, and its derivative by λ.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn at(&self, lambda: f64) -> ([f64; M], [f64; M]) {
         let (mut over, mut rate) = (self.numerator[M - 1], [0.0; M]);
         for coefficient in self.numerator[..M - 1].iter().rev() {
@@ -286,12 +286,12 @@ impl PeriodProblem<'_> {
         match u.len() {
             1 => self.bent_row_for::<1>(u, last, at, qp),
             2 => self.bent_row_for::<2>(u, last, at, qp),
-            3 => self.bent_row_for::<3>(u, last, at, qp),
+            3 if INPUTS >= 3 => self.bent_row_for::<3>(u, last, at, qp),
             _ => None,
         }
     }
 
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn bent_row_for<const M: usize>(
         &self,
         u: &mut [f64],
@@ -461,7 +461,7 @@ impl PeriodProblem<'_> {
 
     /// The row of the sample that u_ref violates by the largest distance, and the input nearest to u_ref that meets it;
     /// `None` if there is none.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn furthest<const M: usize>(&self, u_ref: &[f64; M]) -> Option<(usize, [f64; M])> {
         let (mut furthest, mut distance) = (None, 0.0);
         for (i, requirement) in self.requirements.iter().enumerate() {
@@ -478,7 +478,7 @@ impl PeriodProblem<'_> {
     }
 
     /// Whether the row `chosen`, with the curvature of `hessian` at `last`, leads to the answer `u`.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "small"), inline(always))]
     fn leads_to<const M: usize>(
         &self,
         last: &[f64; M],
@@ -498,8 +498,6 @@ impl PeriodProblem<'_> {
         lambda > 0.0 && largest(&left) <= CONVERGING * largest(&away) + SAME * largest(u).max(1.0)
     }
 }
-
-const _: () = assert!(MAX_INPUTS >= INPUTS, "a gradient has room for so many inputs");
 
 #[cfg(test)]
 mod tests {

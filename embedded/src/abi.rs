@@ -1,0 +1,410 @@
+//! The functions of `punctual.h`. All `unsafe` code of the crate is here: pointers of the caller, and the memory from which
+//! [`load`](punctual_load) allocates.
+#![allow(unsafe_code)]
+
+use alloc::boxed::Box;
+use core::alloc::{GlobalAlloc, Layout};
+use core::cell::UnsafeCell;
+use core::ffi::c_void;
+use core::mem::MaybeUninit;
+use core::ptr;
+use core::slice;
+use core::sync::atomic::{AtomicBool, Ordering};
+
+use linked_list_allocator::Heap;
+use punctual_core::filter::{Filter, FilterState, Phase};
+
+use crate::{FileError, FilterFile, memory, saved};
+
+/// A filter. It lives in the memory that `punctual_load` was given.
+pub struct PunctualFilter {
+    filter: Filter,
+    /// Room for a state to restore.
+    state: FilterState,
+    states: usize,
+    inputs: usize,
+}
+
+/// What a function returns: 0, or why it did nothing.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PunctualResult {
+    /// Done.
+    Ok = 0,
+    /// A pointer is null, or memory is not aligned to 8 bytes.
+    Pointer = 1,
+    /// A length is not that of the filter; a time is negative or no number; there is no such barrier.
+    Argument = 2,
+    /// The memory is less than `punctual_size`; the buffer is less than `punctual_saved_size`.
+    Memory = 3,
+    /// The file is no filter of this version: write it again with `punctual build --embedded`.
+    Format = 4,
+    /// The file or the saved state is damaged.
+    Damaged = 5,
+    /// The filter needs more inputs, a higher relative degree or more rows than this library has room for: build the library
+    /// without the feature `small`.
+    Room = 6,
+    /// The file has a number out of its range.
+    Range = 7,
+    /// Another filter is being loaded at this moment, by an interrupt or a thread: load again.
+    Busy = 8,
+}
+
+impl From<FileError> for PunctualResult {
+    fn from(error: FileError) -> Self {
+        match error {
+            FileError::Format => Self::Format,
+            FileError::Damaged => Self::Damaged,
+            FileError::Room => Self::Room,
+            FileError::Range => Self::Range,
+        }
+    }
+}
+
+/// What a step did.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PunctualReport {
+    /// The status: `PUNCTUAL_UNCHANGED` and so on, numbered as in the FMU.
+    pub status: i32,
+    /// Rounds of the active-set method.
+    pub iterations: u32,
+    /// The period in s over which the rows hold, 0 if at the sample alone.
+    pub period: f64,
+}
+
+/// What a step found of one barrier.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PunctualBarrier {
+    /// h, in its unit; the set is h >= 0.
+    pub h: f64,
+    /// Time in s until the deadline; infinite if there is none.
+    pub time_left: f64,
+    /// By how much its row holds; negative where it does not.
+    pub slack: f64,
+    /// Time in s at which h >= 0 was reached, NaN before.
+    pub arrival_time: f64,
+    /// The phase: `PUNCTUAL_WAITING` and so on, numbered as in the FMU.
+    pub phase: i32,
+    /// Steps in a row that did not meet its row.
+    pub unmet_steps: u32,
+    /// Whether the theorem behind its promise applies from this step on.
+    pub on_course: bool,
+    /// Whether the input bounds rule out that its deadline is met.
+    pub deadline_unreachable: bool,
+    /// Whether other barriers keep it from its goal.
+    pub deadlocked: bool,
+}
+
+/// The memory of the filter that is being loaded; nothing else allocates.
+struct Memory {
+    is_loading: AtomicBool,
+    heap: UnsafeCell<Heap>,
+}
+
+// SAFETY: only who has set `is_loading` allocates.
+unsafe impl Sync for Memory {}
+
+#[global_allocator]
+static MEMORY: Memory = Memory { is_loading: AtomicBool::new(false), heap: UnsafeCell::new(Heap::empty()) };
+
+// SAFETY: the heap hands out parts of the caller's memory, each once, and nothing after that memory is used up.
+unsafe impl GlobalAlloc for Memory {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        // SAFETY: called while loading, by the one who loads.
+        let heap = unsafe { &mut *self.heap.get() };
+        heap.allocate_first_fit(layout).map_or(ptr::null_mut(), |found| found.as_ptr())
+    }
+
+    unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
+        // SAFETY: as above.
+        let heap = unsafe { &mut *self.heap.get() };
+        if let Some(block) = ptr::NonNull::new(block) {
+            // SAFETY: `block` is of this heap: nothing is freed after loading.
+            unsafe { heap.deallocate(block, layout) };
+        }
+    }
+}
+
+/// Nothing panics after loading with what `punctual_load` accepts. If it does, the program stops here.
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo) -> ! {
+    loop {
+        core::hint::spin_loop();
+    }
+}
+
+/// The bytes at `data`.
+///
+/// # Safety
+///
+/// `data` is null or points to `length` values that nobody writes meanwhile.
+unsafe fn given<'a, T>(data: *const T, length: usize) -> Option<&'a [T]> {
+    // SAFETY: by the caller.
+    (!data.is_null() && data.is_aligned()).then(|| unsafe { slice::from_raw_parts(data, length) })
+}
+
+/// The number of bytes that a filter needs, in `*size`.
+///
+/// # Safety
+///
+/// `file` is null or points to `file_size` bytes; `size` is null or valid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn punctual_size(
+    file: *const c_void,
+    file_size: usize,
+    size: *mut usize,
+) -> PunctualResult {
+    // SAFETY: by the caller.
+    let (file, size) = (unsafe { given(file.cast::<u8>(), file_size) }, unsafe { size.as_mut() });
+    let (Some(file), Some(size)) = (file, size) else { return PunctualResult::Pointer };
+    match memory::needed(file) {
+        Ok(needed) => {
+            *size = needed + size_of::<PunctualFilter>();
+            PunctualResult::Ok
+        }
+        Err(error) => error.into(),
+    }
+}
+
+/// Makes the filter of `file` in `memory`, which it keeps; `file` may go. The only function that allocates, and only there.
+///
+/// # Safety
+///
+/// `memory` and `file` are null or point to as many bytes, those of `memory` used by nothing else as long as the filter is.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn punctual_load(
+    memory: *mut c_void,
+    memory_size: usize,
+    file: *const c_void,
+    file_size: usize,
+    filter: *mut *mut PunctualFilter,
+) -> PunctualResult {
+    // SAFETY: by the caller.
+    let (file, filter) = (unsafe { given(file.cast::<u8>(), file_size) }, unsafe { filter.as_mut() });
+    let (Some(file), Some(filter)) = (file, filter) else { return PunctualResult::Pointer };
+    *filter = ptr::null_mut();
+    if memory.is_null() || !memory.cast::<u64>().is_aligned() {
+        return PunctualResult::Pointer;
+    }
+    match memory::needed(file) {
+        Ok(needed) if memory_size < needed + size_of::<PunctualFilter>() => return PunctualResult::Memory,
+        Ok(_) => {}
+        Err(error) => return error.into(),
+    }
+    if MEMORY.is_loading.swap(true, Ordering::Acquire) {
+        return PunctualResult::Busy;
+    }
+    // SAFETY: nobody else is loading.
+    let heap = unsafe { &mut *MEMORY.heap.get() };
+    // SAFETY: the memory is the filter's from now on, and a heap that is used up before is not asked again.
+    let memory = unsafe { slice::from_raw_parts_mut(memory.cast::<MaybeUninit<u8>>(), memory_size) };
+    *heap = Heap::empty();
+    // SAFETY: it is valid as long as the filter is, and no block of the heap is freed later.
+    unsafe { heap.init(memory.as_mut_ptr().cast(), memory.len()) };
+    let made = FilterFile::from_bytes(file).and_then(|file| {
+        let (states, inputs) = (file.plant.states(), file.plant.inputs());
+        let filter = file.into_filter()?;
+        let state = filter.state().clone();
+        Ok(Box::new(PunctualFilter { filter, state, states, inputs }))
+    });
+    let result = match made {
+        Ok(made) => {
+            *filter = Box::into_raw(made);
+            PunctualResult::Ok
+        }
+        Err(error) => error.into(),
+    };
+    // SAFETY: still the only one who loads.
+    unsafe { *MEMORY.heap.get() = Heap::empty() };
+    MEMORY.is_loading.store(false, Ordering::Release);
+    result
+}
+
+/// The numbers of states, inputs and barriers; 0 for null.
+///
+/// # Safety
+///
+/// `filter` is null or from `punctual_load`; the others are null or valid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn punctual_dimensions(
+    filter: *const PunctualFilter,
+    states: *mut usize,
+    inputs: *mut usize,
+    barriers: *mut usize,
+) -> PunctualResult {
+    // SAFETY: by the caller.
+    let Some(own) = (unsafe { filter.as_ref() }) else { return PunctualResult::Pointer };
+    let numbers = [own.states, own.inputs, own.filter.report().barriers.len()];
+    for (to, number) in [states, inputs, barriers].into_iter().zip(numbers) {
+        // SAFETY: by the caller.
+        if let Some(to) = unsafe { to.as_mut() } {
+            *to = number;
+        }
+    }
+    PunctualResult::Ok
+}
+
+/// The time in s, > 0, for which the input of the next step will be held, if the timer knows it; 0 if not.
+///
+/// # Safety
+///
+/// `filter` is null or from `punctual_load`, and used by nobody else meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn punctual_expect_hold(filter: *mut PunctualFilter, seconds: f64) -> PunctualResult {
+    // SAFETY: by the caller.
+    let Some(own) = (unsafe { filter.as_mut() }) else { return PunctualResult::Pointer };
+    match own.filter.expect_hold((seconds != 0.0).then_some(seconds)) {
+        Ok(()) => PunctualResult::Ok,
+        Err(_) => PunctualResult::Argument,
+    }
+}
+
+/// Writes to `u` the safe input nearest to `u_ref` at time `t` (s) and state `x`: finite and within its bounds, whatever
+/// `x` and `u_ref` are. Does not allocate.
+///
+/// # Safety
+///
+/// `filter` is null or from `punctual_load`, and used by nobody else meanwhile. `x`, `u_ref` and `u` are null or have as many
+/// numbers as stated; `u` may be `u_ref`. `report` is null or valid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn punctual_step(
+    filter: *mut PunctualFilter,
+    t: f64,
+    x: *const f64,
+    states: usize,
+    u_ref: *const f64,
+    u: *mut f64,
+    inputs: usize,
+    report: *mut PunctualReport,
+) -> PunctualResult {
+    // SAFETY: by the caller.
+    let Some(own) = (unsafe { filter.as_mut() }) else { return PunctualResult::Pointer };
+    if states != own.states || inputs != own.inputs {
+        return PunctualResult::Argument;
+    }
+    // SAFETY: by the caller.
+    let (x, wanted) = (unsafe { given(x, states) }, unsafe { given(u_ref, inputs) });
+    let (Some(x), Some(wanted), false) = (x, wanted, u.is_null()) else { return PunctualResult::Pointer };
+    let mut asked = [0.0; punctual_core::MAX_INPUTS];
+    let mut safe = asked;
+    asked[..inputs].copy_from_slice(wanted);
+    let Ok(found) = own.filter.step(t, x, &asked[..inputs], &mut safe[..inputs]) else {
+        return PunctualResult::Argument;
+    };
+    // SAFETY: by the caller.
+    unsafe { ptr::copy_nonoverlapping(safe.as_ptr(), u, inputs) };
+    // SAFETY: by the caller.
+    if let Some(report) = unsafe { report.as_mut() } {
+        let (status, iterations, period) = (found.status as i32, found.iterations, found.period);
+        *report = PunctualReport { status, iterations, period };
+    }
+    PunctualResult::Ok
+}
+
+/// What the last step found of barrier number `index`, from 0 in the order of the file.
+///
+/// # Safety
+///
+/// `filter` is null or from `punctual_load`, and used by nobody else meanwhile; `barrier` is null or valid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn punctual_barrier(
+    filter: *const PunctualFilter,
+    index: usize,
+    barrier: *mut PunctualBarrier,
+) -> PunctualResult {
+    // SAFETY: by the caller.
+    let (own, barrier) = (unsafe { filter.as_ref() }, unsafe { barrier.as_mut() });
+    let (Some(own), Some(barrier)) = (own, barrier) else { return PunctualResult::Pointer };
+    let Some(found) = own.filter.report().barriers.get(index) else { return PunctualResult::Argument };
+    *barrier = PunctualBarrier {
+        h: found.h,
+        time_left: found.time_left,
+        slack: found.slack,
+        arrival_time: found.arrival_time.unwrap_or(f64::NAN),
+        phase: phase(found.phase),
+        unmet_steps: found.unmet_steps,
+        on_course: found.on_course,
+        deadline_unreachable: found.deadline_unreachable,
+        deadlocked: found.deadlocked,
+    };
+    PunctualResult::Ok
+}
+
+fn phase(phase: Phase) -> i32 {
+    phase as i32
+}
+
+/// Forgets what was promised: the next step starts every deadline again.
+///
+/// # Safety
+///
+/// `filter` is null or from `punctual_load`, and used by nobody else meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn punctual_rearm(filter: *mut PunctualFilter) -> PunctualResult {
+    // SAFETY: by the caller.
+    let Some(own) = (unsafe { filter.as_mut() }) else { return PunctualResult::Pointer };
+    own.filter.rearm();
+    PunctualResult::Ok
+}
+
+/// The most bytes that `punctual_save` writes; 0 for null.
+///
+/// # Safety
+///
+/// `filter` is null or from `punctual_load`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn punctual_saved_size(filter: *const PunctualFilter) -> usize {
+    // SAFETY: by the caller.
+    unsafe { filter.as_ref() }.map_or(0, |own| saved::size(own.filter.state()))
+}
+
+/// Writes what the filter remembers to `buffer`, and the number of bytes to `*written`.
+///
+/// # Safety
+///
+/// `filter` is null or from `punctual_load`, and used by nobody else meanwhile; `buffer` is null or has `size` bytes;
+/// `written` is null or valid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn punctual_save(
+    filter: *const PunctualFilter,
+    buffer: *mut c_void,
+    size: usize,
+    written: *mut usize,
+) -> PunctualResult {
+    // SAFETY: by the caller.
+    let (own, written) = (unsafe { filter.as_ref() }, unsafe { written.as_mut() });
+    let (Some(own), Some(written), false) = (own, written, buffer.is_null()) else {
+        return PunctualResult::Pointer;
+    };
+    // SAFETY: by the caller.
+    let buffer = unsafe { slice::from_raw_parts_mut(buffer.cast::<u8>(), size) };
+    match saved::write(own.filter.state(), buffer) {
+        Some(length) => {
+            *written = length;
+            PunctualResult::Ok
+        }
+        None => PunctualResult::Memory,
+    }
+}
+
+/// Continues from what `punctual_save` wrote, as if there had been no break. On another filter of the same file too.
+///
+/// # Safety
+///
+/// `filter` is null or from `punctual_load`, and used by nobody else meanwhile; `buffer` is null or has `size` bytes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn punctual_restore(
+    filter: *mut PunctualFilter,
+    buffer: *const c_void,
+    size: usize,
+) -> PunctualResult {
+    // SAFETY: by the caller.
+    let (own, buffer) = (unsafe { filter.as_mut() }, unsafe { given(buffer.cast::<u8>(), size) });
+    let (Some(own), Some(buffer)) = (own, buffer) else { return PunctualResult::Pointer };
+    match saved::read(buffer, &mut own.state) {
+        Some(()) if own.filter.restore(&own.state).is_ok() => PunctualResult::Ok,
+        _ => PunctualResult::Damaged,
+    }
+}
