@@ -135,6 +135,11 @@ fn panic(_: &core::panic::PanicInfo) -> ! {
     }
 }
 
+/// What the precompiled parts of Rust's library refer to on systems that unwind; nothing here unwinds.
+#[cfg(not(target_os = "none"))]
+#[unsafe(no_mangle)]
+extern "C" fn rust_eh_personality() {}
+
 /// The bytes at `data`.
 ///
 /// # Safety

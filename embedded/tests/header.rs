@@ -14,7 +14,11 @@ const ABOUT: &str = "\
    know of each other. This file is made by cbindgen. */";
 
 /// An enumeration of numbers that have a name and a meaning.
-fn enumeration(name: &str, about: &str, values: impl Iterator<Item = (i32, &'static str, &'static str)>) -> String {
+fn enumeration(
+    name: &str,
+    about: &str,
+    values: impl Iterator<Item = (i32, &'static str, &'static str)>,
+) -> String {
     let mut text = format!("/* {about} */\nenum punctual_{name} {{\n");
     for (number, word, meaning) in values {
         let word = word.to_uppercase();
