@@ -1,6 +1,7 @@
 //! The functions of `punctual.h`. All `unsafe` code of the crate is here: pointers of the caller, and the memory from which
 //! [`load`](punctual_load) allocates.
 #![allow(unsafe_code)]
+#![allow(unreachable_pub, reason = "cbindgen reads what is public; C calls it")]
 
 use alloc::boxed::Box;
 use core::alloc::{GlobalAlloc, Layout};
@@ -12,15 +13,14 @@ use core::slice;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use linked_list_allocator::Heap;
-use punctual_core::filter::{Filter, FilterState, Phase};
+use punctual_core::filter::{Filter, Phase};
 
-use crate::{FileError, FilterFile, memory, saved};
+use crate::memory::Size;
+use crate::{FileError, saved};
 
 /// A filter. It lives in the memory that `punctual_load` was given.
 pub struct PunctualFilter {
     filter: Filter,
-    /// Room for a state to restore.
-    state: FilterState,
     states: usize,
     inputs: usize,
 }
@@ -127,9 +127,18 @@ unsafe impl GlobalAlloc for Memory {
     }
 }
 
-/// Nothing panics after loading with what `punctual_load` accepts. If it does, the program stops here.
+/// Nothing panics with what the functions accept. If it does, the program stops here.
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo) -> ! {
+    #[cfg(not(target_os = "none"))]
+    {
+        unsafe extern "C" {
+            fn abort() -> !;
+        }
+        // SAFETY: every C library has it.
+        unsafe { abort() }
+    }
+    #[cfg(target_os = "none")]
     loop {
         core::hint::spin_loop();
     }
@@ -150,6 +159,13 @@ unsafe fn given<'a, T>(data: *const T, length: usize) -> Option<&'a [T]> {
     (!data.is_null() && data.is_aligned()).then(|| unsafe { slice::from_raw_parts(data, length) })
 }
 
+/// The bytes that the filter of a file needs, and its numbers of states and inputs.
+fn needed(file: &[u8]) -> Result<(usize, [usize; 2]), FileError> {
+    let size = Size::of(file)?;
+    let memory = size.memory().and_then(|memory| memory.checked_add(size_of::<PunctualFilter>()));
+    memory.map(|memory| (memory, size.dimensions())).ok_or(FileError::Room)
+}
+
 /// The number of bytes that a filter needs, in `*size`.
 ///
 /// # Safety
@@ -164,9 +180,9 @@ pub unsafe extern "C" fn punctual_size(
     // SAFETY: by the caller.
     let (file, size) = (unsafe { given(file.cast::<u8>(), file_size) }, unsafe { size.as_mut() });
     let (Some(file), Some(size)) = (file, size) else { return PunctualResult::Pointer };
-    match memory::needed(file) {
-        Ok(needed) => {
-            *size = needed + size_of::<PunctualFilter>();
+    match needed(file) {
+        Ok((needed, _)) => {
+            *size = needed;
             PunctualResult::Ok
         }
         Err(error) => error.into(),
@@ -193,11 +209,11 @@ pub unsafe extern "C" fn punctual_load(
     if memory.is_null() || !memory.cast::<u64>().is_aligned() {
         return PunctualResult::Pointer;
     }
-    match memory::needed(file) {
-        Ok(needed) if memory_size < needed + size_of::<PunctualFilter>() => return PunctualResult::Memory,
-        Ok(_) => {}
+    let [states, inputs] = match needed(file) {
+        Ok((needed, _)) if memory_size < needed => return PunctualResult::Memory,
+        Ok((_, dimensions)) => dimensions,
         Err(error) => return error.into(),
-    }
+    };
     if MEMORY.is_loading.swap(true, Ordering::Acquire) {
         return PunctualResult::Busy;
     }
@@ -208,12 +224,7 @@ pub unsafe extern "C" fn punctual_load(
     *heap = Heap::empty();
     // SAFETY: it is valid as long as the filter is, and no block of the heap is freed later.
     unsafe { heap.init(memory.as_mut_ptr().cast(), memory.len()) };
-    let made = FilterFile::from_bytes(file).and_then(|file| {
-        let (states, inputs) = (file.plant.states(), file.plant.inputs());
-        let filter = file.into_filter()?;
-        let state = filter.state().clone();
-        Ok(Box::new(PunctualFilter { filter, state, states, inputs }))
-    });
+    let made = crate::read(file).map(|filter| Box::new(PunctualFilter { filter, states, inputs }));
     let result = match made {
         Ok(made) => {
             *filter = Box::into_raw(made);
@@ -408,8 +419,8 @@ pub unsafe extern "C" fn punctual_restore(
     // SAFETY: by the caller.
     let (own, buffer) = (unsafe { filter.as_mut() }, unsafe { given(buffer.cast::<u8>(), size) });
     let (Some(own), Some(buffer)) = (own, buffer) else { return PunctualResult::Pointer };
-    match saved::read(buffer, &mut own.state) {
-        Some(()) if own.filter.restore(&own.state).is_ok() => PunctualResult::Ok,
-        _ => PunctualResult::Damaged,
+    match own.filter.restore_by(|state| saved::read(buffer, state).is_some()) {
+        true => PunctualResult::Ok,
+        false => PunctualResult::Damaged,
     }
 }

@@ -3,15 +3,22 @@
 use alloc::vec::Vec;
 use core::fmt;
 
-use punctual_core::MAX_ROWS;
-use punctual_core::filter::{BarrierSettings, Begin, End, Filter, Sampling, Strictness};
-use punctual_models::recorded::{self, BarrierTape, PlantTape};
+use punctual_core::convergence::operator::Operator;
+use punctual_core::filter::{
+    BarrierSettings, Begin, End, Infeasible, Method, ProfileKind, Sampling, Strictness,
+};
+use punctual_models::recorded::{BarrierTape, PlantTape};
 use serde::{Deserialize, Serialize};
+
+use crate::checksum::checksum;
 
 /// The first bytes of a file: what it is, and the version of its format.
 const MAGIC: [u8; 8] = *b"PUNCTL\x00\x01";
 /// Of the head: the magic, the length of what follows and its CRC-32, both little-endian.
 const HEAD: usize = 16;
+
+/// The most rates of a promise: one for each order of the highest relative degree of any library.
+const MOST_RATES: usize = 8;
 
 /// A filter as data: a plant, its barriers, and what is promised of them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -49,13 +56,61 @@ pub struct BarrierFile {
     /// Its relative degree.
     pub relative_degree: u8,
     /// Its promise.
-    pub settings: BarrierSettings,
+    pub promise: Promise,
     /// From when on it is enforced.
     pub begin: Begin,
     /// Until when it is enforced.
     pub end: End,
     /// What becomes of it where not all can be met.
     pub strictness: Strictness,
+}
+
+/// The settings of a promise, as numbers that are read without allocating.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Promise {
+    deadline: Option<f64>,
+    method: Method,
+    profile: ProfileKind,
+    infeasible: Infeasible,
+    rate: Option<f64>,
+    /// As many as the relative degree, then zeros.
+    rates: Option<[f64; MOST_RATES]>,
+    stay_rate: Option<f64>,
+    margin: f64,
+    recovery: Option<f64>,
+    disturbance: f64,
+}
+
+impl Promise {
+    /// The promise with these settings.
+    pub fn of(settings: &BarrierSettings) -> Self {
+        let BarrierSettings {
+            deadline, method, profile, infeasible, rate, stay_rate, margin, recovery, ..
+        } = *settings;
+        let rates = settings.rates.map(|rates| {
+            let rates = Vec::from(rates);
+            core::array::from_fn(|i| rates.get(i).copied().unwrap_or(0.0))
+        });
+        let disturbance = settings.disturbance;
+        Self { deadline, method, profile, infeasible, rate, rates, stay_rate, margin, recovery, disturbance }
+    }
+
+    /// The settings for relative degree `n`, of 1 to [`MOST_RATES`].
+    pub(crate) fn settings(self, n: usize) -> Result<BarrierSettings, punctual_core::Error> {
+        let rates = self.rates.as_ref().and_then(|rates| rates.get(..n));
+        let rates = rates.map(Operator::new).transpose()?;
+        Ok(BarrierSettings::keeping()
+            .deadline(self.deadline)
+            .method(self.method)
+            .profile(self.profile)
+            .infeasible(self.infeasible)
+            .rate(self.rate)
+            .rates(rates)
+            .stay_rate(self.stay_rate)
+            .margin(self.margin)
+            .recovery(self.recovery)
+            .disturbance(self.disturbance))
+    }
 }
 
 /// Why a file is no filter.
@@ -95,7 +150,7 @@ pub(crate) fn content(bytes: &[u8]) -> Result<&[u8], FileError> {
     }
     let number = |at: usize| u32::from_le_bytes(core::array::from_fn(|i| numbers[at + i]));
     let content = rest.get(..number(0) as usize).ok_or(FileError::Damaged)?;
-    if crate::checksum(content) == number(4) { Ok(content) } else { Err(FileError::Damaged) }
+    if checksum(content) == number(4) { Ok(content) } else { Err(FileError::Damaged) }
 }
 
 impl FilterFile {
@@ -109,53 +164,8 @@ impl FilterFile {
         let length = u32::try_from(content.len()).map_err(|_| FileError::Range)?;
         let mut bytes = MAGIC.to_vec();
         bytes.extend(length.to_le_bytes());
-        bytes.extend(crate::checksum(&content).to_le_bytes());
+        bytes.extend(checksum(&content).to_le_bytes());
         bytes.extend(content);
         Ok(bytes)
-    }
-
-    /// Reads the bytes of a file. What follows its end is ignored.
-    ///
-    /// # Errors
-    ///
-    /// Bytes that are no such file.
-    pub fn from_bytes(bytes: &[u8]) -> Result<Self, FileError> {
-        postcard::from_bytes(content(bytes)?).map_err(|_| FileError::Damaged)
-    }
-
-    /// The filter, not yet anchored.
-    ///
-    /// # Errors
-    ///
-    /// What the tapes or the numbers lack.
-    pub fn into_filter(self) -> Result<Filter, FileError> {
-        let Self { settings, plant, barriers } = self;
-        if barriers.len() > MAX_ROWS {
-            return Err(FileError::Room);
-        }
-        let (states, inputs) = (plant.states(), plant.inputs());
-        let mut tapes = Vec::with_capacity(barriers.len());
-        let mut promises = Vec::with_capacity(barriers.len());
-        for barrier in barriers {
-            tapes.push((barrier.tape, usize::from(barrier.relative_degree)));
-            promises.push((barrier.settings, barrier.begin, barrier.end, barrier.strictness));
-        }
-        let sources = recorded::sources(plant, tapes).map_err(|_| FileError::Room)?;
-        let mut builder = Filter::from_sources(states, inputs).room_for(sources.len());
-        let range = |_: punctual_core::Error| FileError::Range;
-        for (source, (promise, begin, end, strictness)) in sources.into_iter().zip(promises) {
-            builder = builder.source("", source, promise).map_err(range)?;
-            builder = builder.window(begin, end).and_then(|b| b.strictness(strictness)).map_err(range)?;
-        }
-        let bound = |side: usize| settings.bounds.iter().map(move |bounds| bounds[side]);
-        let (min, max): (Vec<f64>, Vec<f64>) = (bound(0).collect(), bound(1).collect());
-        builder = builder.bounds(&min, &max).map_err(range)?;
-        builder = builder.correction_limit(settings.correction_limit).map_err(range)?;
-        builder = builder.actuation_delay(settings.actuation_delay).map_err(range)?;
-        if settings.period_max != 0.0 {
-            builder = builder.period_max(settings.period_max).map_err(range)?;
-        }
-        builder = builder.arm_after(settings.arm_after).map_err(range)?;
-        builder.sampling(settings.sampling).and_then(|b| b.build()).map_err(range)
     }
 }

@@ -6,8 +6,10 @@
 //!
 //! | module | owns |
 //! |---|---|
-//! | `file` | the file, and the filter that it holds |
-//! | `memory` | how much memory that takes |
+//! | `checksum` | whether bytes are those that were written |
+//! | `file` | the file |
+//! | `memory` | how much memory its filter takes |
+//! | `read` | its filter |
 //! | `saved` | what a filter remembers, as bytes |
 //! | `abi` | the functions of `punctual.h` (feature `c`) |
 #![no_std]
@@ -18,15 +20,13 @@ extern crate alloc;
 
 #[cfg(feature = "c")]
 mod abi;
+mod checksum;
 mod file;
-#[cfg(feature = "c")]
 mod memory;
+mod read;
 #[cfg(feature = "c")]
 mod saved;
 
-pub use file::{BarrierFile, FileError, FilterFile, Settings};
-
-/// The CRC-32 of `bytes`. Without a table: it would take more flash than the rest of the file's code.
-fn checksum(bytes: &[u8]) -> u32 {
-    crc::Crc::<u32, crc::NoTable>::new(&crc::CRC_32_ISO_HDLC).checksum(bytes)
-}
+pub use file::{BarrierFile, FileError, FilterFile, Promise, Settings};
+pub use memory::Size;
+pub use read::read;

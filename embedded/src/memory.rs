@@ -1,14 +1,12 @@
 //! How much memory the filter of a file takes, found without allocating.
 
-use core::mem::size_of;
-
-use punctual_core::filter::{BarrierSettings, Begin, End, Filter, Strictness};
+use punctual_core::filter::{Begin, End, Filter, Strictness};
 use punctual_core::{MAX_INPUTS, MAX_ROWS};
 use punctual_models::MAX_STATES;
 use punctual_models::recorded::{self, BarrierSize, PlantSize, Tallied, Tally};
 use serde::Deserialize;
 
-use crate::file::{BarrierFile, FileError, Settings, content};
+use crate::file::{FileError, Promise, Settings, content};
 
 /// The size of a file: the same bytes as [`FilterFile`](crate::FilterFile).
 #[derive(Deserialize)]
@@ -22,7 +20,7 @@ struct FileSize {
 struct One {
     tape: BarrierSize,
     relative_degree: u8,
-    _promise: BarrierSettings,
+    _promise: Promise,
     _begin: Begin,
     _end: End,
     _strictness: Strictness,
@@ -56,27 +54,51 @@ impl Tally for Bounds {
     }
 }
 
-/// The most bytes that reading the file and making its filter take.
-///
-/// # Errors
-///
-/// Bytes that are no such file; more than there is room for.
-pub(crate) fn needed(file: &[u8]) -> Result<usize, FileError> {
-    let FileSize { settings, plant, barriers: Tallied(barriers) } =
-        postcard::from_bytes(content(file)?).map_err(|_| FileError::Damaged)?;
-    if barriers.count > MAX_ROWS || plant.states() > MAX_STATES || plant.inputs() > MAX_INPUTS {
-        return Err(FileError::Room);
+/// Room in bytes for the words of an error, of which the caller gets the kind alone.
+const WORDS: usize = 1024;
+
+/// The size of a file and of its filter, read without allocating.
+pub struct Size(FileSize);
+
+impl Size {
+    /// The size of the file with these bytes.
+    ///
+    /// # Errors
+    ///
+    /// Bytes that are no such file; more than there is room for.
+    pub fn of(file: &[u8]) -> Result<Self, FileError> {
+        let size: FileSize = postcard::from_bytes(content(file)?).map_err(|_| FileError::Damaged)?;
+        let (Tallied(barriers), plant) = (&size.barriers, &size.plant);
+        let fits = barriers.count <= MAX_ROWS && plant.states() <= MAX_STATES && plant.inputs() <= MAX_INPUTS;
+        if fits { Ok(Self(size)) } else { Err(FileError::Room) }
     }
-    let needed = || {
-        let tapes = recorded::memory(&plant, barriers.count, &barriers.largest, barriers.degree)?;
-        let promise = size_of::<BarrierFile>() + size_of::<One>();
-        let lists = settings.bounds.0.0.checked_mul(2 * size_of::<[f64; 2]>())?;
+
+    /// The most results of a barrier.
+    pub fn results(&self) -> usize {
+        self.0.barriers.0.largest.results()
+    }
+
+    /// The highest relative degree.
+    pub fn degree(&self) -> usize {
+        self.0.barriers.0.degree
+    }
+
+    /// The numbers of states and inputs.
+    pub fn dimensions(&self) -> [usize; 2] {
+        [self.0.plant.states(), self.0.plant.inputs()]
+    }
+
+    /// The most bytes that reading the file and making its filter take; `None` where that is no number.
+    pub fn memory(&self) -> Option<usize> {
+        let FileSize { settings, plant, barriers: Tallied(barriers) } = &self.0;
+        let tapes = recorded::memory(plant, barriers.count, &barriers.largest, barriers.degree)?;
         let filter = Filter::memory(
             (barriers.count, plant.states()),
             (settings.actuation_delay, settings.sampling),
             settings.period_max > 0.0,
         );
-        tapes.checked_add(barriers.count * promise)?.checked_add(lists)?.checked_add(filter)
-    };
-    needed().ok_or(FileError::Room)
+        // The bounds are read, and handed on as two lists that grow.
+        let bounds = settings.bounds.0.0.checked_mul(4 * size_of::<[f64; 2]>())?;
+        tapes.checked_add(bounds)?.checked_add(filter)?.checked_add(WORDS)
+    }
 }

@@ -7,6 +7,8 @@ use punctual_core::convergence::FixedTimeState;
 use punctual_core::filter::{Curvature, FilterState, MAX_SENT, Sent};
 use serde::{Deserialize, Serialize};
 
+use crate::checksum::checksum;
+
 /// The CRC-32 of what follows, little-endian.
 const HEAD: usize = 4;
 
@@ -55,14 +57,14 @@ pub(crate) fn write(state: &FilterState, buffer: &mut [u8]) -> Option<usize> {
     for sent in &state.sent {
         length += postcard::to_slice(sent, content.get_mut(length..)?).ok()?.len();
     }
-    *head = crate::checksum(&content[..length]).to_le_bytes();
+    *head = checksum(&content[..length]).to_le_bytes();
     Some(HEAD + length)
 }
 
 /// Reads what [`write`] wrote into a `state` with as many barriers. Returns whether it is whole.
 pub(crate) fn read(bytes: &[u8], state: &mut FilterState) -> Option<()> {
     let (head, content) = bytes.split_first_chunk::<HEAD>()?;
-    if u32::from_le_bytes(*head) != crate::checksum(content) {
+    if u32::from_le_bytes(*head) != checksum(content) {
         return None;
     }
     let (numbers, mut rest): (Numbers, _) = postcard::take_from_bytes(content).ok()?;

@@ -122,7 +122,7 @@ impl Model {
         }
         let Tape { steps, registers, .. } = &model.tape;
         Ok(Functions {
-            steps: needed(steps, &results, *registers),
+            steps: needed(steps, results.iter().copied(), *registers),
             results,
             states: self.states.len(),
             time: self.states.len() + self.inputs.len(),
@@ -245,8 +245,8 @@ impl Barrier {
         let Self { model, h } = self;
         let Tape { steps, registers, .. } = &model.tape;
         let (states, inputs) = (model.states.len(), model.inputs.len());
-        let of_plant = needed(steps, &model.derivatives, *registers);
-        let mut of_barrier = needed(steps, &[*h], *registers);
+        let of_plant = needed(steps, model.derivatives.iter().copied(), *registers);
+        let mut of_barrier = needed(steps, [*h], *registers);
         of_barrier.retain(|step| !of_plant.contains(step));
         // The registers that are left get the next numbers.
         let mut next = states + inputs + 1;
@@ -293,9 +293,9 @@ impl Model {
             states: self.states.len(),
             inputs: self.inputs.len(),
             registers: *registers,
-            steps: needed(steps, &wanted, *registers),
+            steps: needed(steps, wanted, *registers),
             derivatives: self.derivatives.clone(),
-            last: needed(steps, h.as_slice(), *registers),
+            last: needed(steps, h, *registers),
             h,
         }
     }
@@ -328,7 +328,7 @@ impl Equations for Listed {
     }
 
     fn of_motion(&self) -> Self {
-        let steps = needed(&self.steps, &self.derivatives, self.registers);
+        let steps = needed(&self.steps, self.derivatives.iter().copied(), self.registers);
         Self { steps, last: Vec::new(), ..self.clone() }
     }
 
@@ -345,7 +345,7 @@ impl Equations for Listed {
         let mut wanted: Vec<Register> = self.h.into_iter().collect();
         let mut moving = vec![false; self.states];
         loop {
-            let steps = needed(&self.steps, &wanted, self.registers);
+            let steps = needed(&self.steps, wanted.iter().copied(), self.registers);
             let read = steps.iter().flat_map(|step| step.operation.reads()).flatten();
             let read: Vec<Register> =
                 read.chain(wanted.iter().copied()).filter(|r| *r < self.states).collect();

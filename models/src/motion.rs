@@ -4,6 +4,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
+use punctual_core::MAX_RELATIVE_DEGREE;
 use punctual_core::internal::{self, SUBSTEPS};
 use punctual_core::interval::Interval;
 use punctual_core::jet::Dual;
@@ -188,22 +189,22 @@ impl<E: Equations, C: Scalar> Along<E, C> {
         Self { flow: Flow::new(plant), equations: along.clone(), series, h: 0, n }
     }
 
-    /// Computes the coefficients of h from the state and the inputs of `flow`, at time `t`.
-    pub(crate) fn continue_from_flow(&mut self, t: f64) {
+    /// Computes the coefficients of h up to `n` from the state and the inputs of `flow`, at time `t`.
+    pub(crate) fn continue_from_flow(&mut self, t: f64, n: usize) {
         let (series, flow) = (&mut self.series, &self.flow);
         let time = flow.inputs().end;
         for register in 0..time {
             series.set(register, 0, flow.series.get(register, 0));
         }
         series.set(time, 0, C::from(t));
-        for k in 0..self.n {
+        for k in 0..n {
             self.equations.advance(series, k);
             for i in 0..self.equations.states() {
                 let slope = series.get(self.equations.derivative(i), k);
                 series.set(i, k + 1, slope * (1.0 / (k + 1) as f64));
             }
         }
-        self.h = self.equations.finish(series, self.n);
+        self.h = self.equations.finish(series, n);
     }
 
     /// h⁽ᵏ⁾.
@@ -231,7 +232,7 @@ impl<E: Equations, C: Scalar> Along<E, C> {
     /// Computes the coefficients of h `duration` ahead, starting from the state and the inputs of `flow`.
     pub(crate) fn ahead(&mut self, t: f64, duration: f64) {
         self.flow.run(duration, SUBSTEPS);
-        self.continue_from_flow(t + duration);
+        self.continue_from_flow(t + duration, self.n);
     }
 }
 
@@ -256,31 +257,27 @@ impl<E: Equations, const M: usize> Along<E, Dual<M>> {
     pub(crate) fn evaluate_at(&mut self, t: f64, x: &[f64], u: impl Fn(usize) -> f64) {
         self.flow.set_state(x.iter().map(|&v| Dual::from(v)));
         self.hold(u);
-        self.continue_from_flow(t);
+        self.continue_from_flow(t, self.n);
     }
 
     /// Writes what [`DerivativeSource::evaluate`](punctual_core::lie::DerivativeSource::evaluate) does.
     pub(crate) fn derivatives(&mut self, t: f64, x: &[f64], out: &mut Derivatives) {
         self.evaluate(t, x);
-        *out = Derivatives::ZERO;
-        let inputs = self.equations.inputs();
-        for k in 0..=self.n {
-            let Dual { value, gradient } = self.derivative(k);
-            out.drift[k] = value;
-            if k == self.n {
-                out.row[..inputs].copy_from_slice(&gradient[..inputs]);
-            } else {
-                // A sum rather than a maximum, since `f64::max` would drop a NaN.
-                out.lower_sensitivity += gradient.iter().map(|d| d.abs()).sum::<f64>();
-            }
-        }
+        write_derivatives(out, self.n, self.equations.inputs(), |k| self.derivative(k));
     }
 
-    /// Writes what [`Predict::ahead`](punctual_core::lie::Predict::ahead) does.
-    pub(crate) fn ahead_held(&mut self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
+    /// Writes what [`Predict::ahead`](punctual_core::lie::Predict::ahead) does for k ≤ `n`.
+    pub(crate) fn ahead_held(
+        &mut self,
+        t: f64,
+        [x, u]: [&[f64]; 2],
+        duration: f64,
+        n: usize,
+        out: &mut Ahead,
+    ) {
         self.arrive(x, u, duration);
-        self.continue_from_flow(t + duration);
-        write(out, self.n, self.equations.inputs(), |k| self.derivative(k));
+        self.continue_from_flow(t + duration, n);
+        write(out, n, self.equations.inputs(), |k| self.derivative(k));
     }
 
     /// Writes the states and inputs `duration` s after `x`, with their derivatives along the inputs.
@@ -291,11 +288,49 @@ impl<E: Equations, const M: usize> Along<E, Dual<M>> {
         }
     }
 
-    /// Writes what [`Self::ahead_held`] does, from the `arrival` at time `t`.
+    /// Writes what [`Self::ahead_held`] does for k < n, from the `arrival` at time `t`.
     pub(crate) fn ahead_along(&mut self, t: f64, arrival: &[Dual<M>], out: &mut Ahead) {
         self.flow.set_state(arrival.iter().copied());
-        self.continue_from_flow(t);
-        write(out, self.n, self.equations.inputs(), |k| self.derivative(k));
+        self.continue_from_flow(t, self.n - 1);
+        write(out, self.n - 1, self.equations.inputs(), |k| self.derivative(k));
+    }
+}
+
+impl<E: Equations> Along<E, f64> {
+    /// Writes the values that [`Along::ahead_held`] does for k ≤ `n`, with the same bits.
+    pub(crate) fn values_ahead(
+        &mut self,
+        t: f64,
+        [x, u]: [&[f64]; 2],
+        duration: f64,
+        n: usize,
+        out: &mut [f64; MAX_RELATIVE_DEGREE + 1],
+    ) {
+        self.flow.set_state(x.iter().copied());
+        self.flow.hold(u.iter().copied());
+        self.flow.predict(duration);
+        self.continue_from_flow(t + duration, n);
+        *out = core::array::from_fn(|k| if k <= n { self.derivative(k) } else { 0.0 });
+    }
+}
+
+/// Writes the derivatives up to `n` of the free motion, and the row of the last.
+pub(crate) fn write_derivatives<const M: usize>(
+    out: &mut Derivatives,
+    n: usize,
+    inputs: usize,
+    derivative: impl Fn(usize) -> Dual<M>,
+) {
+    *out = Derivatives::ZERO;
+    for k in 0..=n {
+        let Dual { value, gradient } = derivative(k);
+        out.drift[k] = value;
+        if k == n {
+            out.row[..inputs].copy_from_slice(&gradient[..inputs]);
+        } else {
+            // A sum rather than a maximum, since `f64::max` would drop a NaN.
+            out.lower_sensitivity += gradient.iter().map(|d| d.abs()).sum::<f64>();
+        }
     }
 }
 

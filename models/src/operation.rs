@@ -113,20 +113,27 @@ pub(crate) struct Step {
 }
 
 /// The operations that the registers `wanted` depend on, in the order of the tape.
-pub(crate) fn needed(steps: &[Step], wanted: &[Register], registers: usize) -> Vec<Step> {
+pub(crate) fn needed(
+    steps: &[Step],
+    wanted: impl IntoIterator<Item = Register>,
+    registers: usize,
+) -> Vec<Step> {
     let mut marked = vec![false; registers];
-    for &register in wanted {
+    for register in wanted {
         marked[register] = true;
     }
-    let mut kept: Vec<Step> = Vec::new();
+    let is_marked =
+        |marked: &[bool], step: &Step| marked[step.to..][..step.operation.results()].contains(&true);
+    let mut count = 0;
     for step in steps.iter().rev() {
-        if (step.to..step.to + step.operation.results()).any(|r| marked[r]) {
+        if is_marked(&marked, step) {
+            count += 1;
             for read in step.operation.reads().into_iter().flatten() {
                 marked[read] = true;
             }
-            kept.push(*step);
         }
     }
-    kept.reverse();
+    let mut kept = Vec::with_capacity(count);
+    kept.extend(steps.iter().filter(|step| is_marked(&marked, step)));
     kept
 }

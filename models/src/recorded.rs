@@ -6,7 +6,6 @@
 
 use alloc::boxed::Box;
 use alloc::format;
-use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -24,7 +23,7 @@ mod size;
 #[cfg(feature = "serde")]
 pub use size::{BarrierSize, PlantSize, Tallied, Tally, memory};
 
-use crate::motion::{Along, Equations, Held, moved, rates_at};
+use crate::motion::{Along, Equations, Held, moved, rates_at, write, write_derivatives};
 use crate::operation::{Register, Step, needed};
 use crate::series::Series;
 use crate::{Error, MAX_OPERATIONS, MAX_STATES};
@@ -98,63 +97,100 @@ impl PlantTape {
     }
 }
 
-/// The sources of `barriers`, each with its relative degree, along `plant`.
-///
-/// # Errors
-///
-/// A tape that is damaged or too long; more inputs or a higher relative degree than there is room for.
-pub fn sources(
-    plant: PlantTape,
-    barriers: Vec<(BarrierTape, usize)>,
-) -> Result<Vec<Box<dyn DerivativeSource>>, Error> {
-    plant.check()?;
-    let (start, mut registers, mut highest) = (plant.registers(), 0, 1);
-    for (i, (barrier, n)) in barriers.iter().enumerate() {
-        let named = |message: String| Error::new(format!("barrier[{i}]"), message);
-        let mut known = start;
-        check("operations", &barrier.steps, &mut known).map_err(|e| named(format!("{e}")))?;
-        if barrier.h >= known {
-            return Err(named("is damaged in its result".into()));
-        }
-        if !(1..=MAX_RELATIVE_DEGREE).contains(n) {
-            return Err(named(format!("has relative degree {n}, must have 1 to {MAX_RELATIVE_DEGREE}")));
-        }
-        (registers, highest) = (registers.max(known), highest.max(*n));
-    }
-    Ok(match plant.inputs {
-        ..=2 if MAX_INPUTS > 4 => made::<2>(plant, barriers, registers, highest),
-        _ => made::<MAX_INPUTS>(plant, barriers, registers, highest),
-    })
+/// A plant along which barriers become sources one by one.
+pub struct Recording(Made);
+
+/// With room for the derivatives along as many inputs.
+enum Made {
+    Two(Plant<2>),
+    Most(Plant<MAX_INPUTS>),
 }
 
-fn made<const M: usize>(
-    plant: PlantTape,
-    barriers: Vec<(BarrierTape, usize)>,
-    registers: usize,
-    highest: usize,
-) -> Vec<Box<dyn DerivativeSource>> {
-    let start = plant.registers();
-    let plant = Arc::new(plant);
-    let alone = Recorded { plant: Arc::clone(&plant), barrier: None, of_value: false, registers: start };
-    let along = Recorded { registers, ..alone.clone() };
-    let scratch =
-        Scratch::<M> { along: Along::new(&alone, &along, highest), held: Held::new(&alone, &along) };
-    let scratch = Arc::new(Mutex::new(scratch));
-    let barrier = |(tape, n): (BarrierTape, usize)| {
+impl Recording {
+    /// Barriers along `plant` with tapes of at most `results` results and relative degrees of at most `degree`.
+    ///
+    /// # Errors
+    ///
+    /// A tape that is damaged or too long; more inputs or a higher relative degree than there is room for.
+    pub fn new(plant: PlantTape, results: usize, degree: usize) -> Result<Self, Error> {
+        plant.check()?;
+        check_degree(degree)?;
+        if results > 2 * MAX_OPERATIONS {
+            return Err(Error::new(
+                "results",
+                format!("is {results}, must be at most {}", 2 * MAX_OPERATIONS),
+            ));
+        }
+        Ok(Self(match plant.inputs {
+            ..=2 if MAX_INPUTS > 4 => Made::Two(Plant::new(plant, results, degree)),
+            _ => Made::Most(Plant::new(plant, results, degree)),
+        }))
+    }
+
+    /// The derivatives of a barrier up to relative degree `n`.
+    ///
+    /// # Errors
+    ///
+    /// A tape that is damaged; more results or a higher relative degree than there is room for.
+    pub fn source(&self, barrier: BarrierTape, n: usize) -> Result<Box<dyn DerivativeSource>, Error> {
+        match &self.0 {
+            Made::Two(plant) => plant.source(barrier, n),
+            Made::Most(plant) => plant.source(barrier, n),
+        }
+    }
+}
+
+fn check_degree(n: usize) -> Result<(), Error> {
+    if (1..=MAX_RELATIVE_DEGREE).contains(&n) {
+        return Ok(());
+    }
+    Err(Error::new("relative_degree", format!("is {n}, must be 1 to {MAX_RELATIVE_DEGREE}")))
+}
+
+/// A plant, and the memory that all sources along it share.
+struct Plant<const M: usize> {
+    along: Recorded,
+    degree: usize,
+    scratch: Arc<Mutex<Scratch<M>>>,
+}
+
+impl<const M: usize> Plant<M> {
+    fn new(plant: PlantTape, results: usize, degree: usize) -> Self {
+        let start = plant.registers();
+        let alone = Recorded { plant: Arc::new(plant), barrier: None, of_value: false, registers: start };
+        let along = Recorded { registers: start + results, ..alone.clone() };
+        let scratch = Scratch {
+            along: Along::new(&alone, &along, degree),
+            values: Along::new(&alone, &along, degree),
+            held: Held::new(&alone, &along),
+            motion: None,
+            motions: 0,
+        };
+        Self { along, degree, scratch: Arc::new(Mutex::new(scratch)) }
+    }
+
+    fn source(&self, tape: BarrierTape, n: usize) -> Result<Box<dyn DerivativeSource>, Error> {
+        let plant = &self.along.plant;
+        let start = plant.registers();
+        let mut known = start;
+        check("barrier", &tape.steps, &mut known)?;
+        if tape.h >= known || known > self.along.registers || n > self.degree {
+            return Err(Error::new("barrier", "is damaged"));
+        }
+        check_degree(n)?;
         let read = tape.steps.iter().flat_map(|step| step.operation.reads()).flatten();
-        let read: Vec<_> = read.chain([tape.h]).filter(|register| *register < start).collect();
-        let own = Own { before: needed(&plant.steps, &read, start), steps: tape.steps, h: tape.h };
-        let barrier = Some(Arc::new(own));
-        let equations = Recorded { barrier, ..along.clone() };
-        Box::new(Source { scratch: Arc::clone(&scratch), equations, n }) as _
-    };
-    barriers.into_iter().map(barrier).collect()
+        let read = read.chain([tape.h]).filter(|register| *register < start);
+        let before = needed(&plant.steps, read, start).into_boxed_slice();
+        let own = Own { before, steps: tape.steps, h: tape.h };
+        let equations = Recorded { barrier: Some(Arc::new(own)), ..self.along.clone() };
+        Ok(Box::new(Source { scratch: Arc::clone(&self.scratch), equations, n, degree: self.degree }))
+    }
 }
 
 /// The operations of a barrier.
 struct Own {
     /// Those of the plant that its value takes.
-    before: Vec<Step>,
+    before: Box<[Step]>,
     steps: Vec<Step>,
     h: Register,
 }
@@ -207,7 +243,48 @@ impl Equations for Recorded {
 /// Memory for evaluations, which the barriers of a filter share.
 struct Scratch<const M: usize> {
     along: Along<Recorded, Dual<M>>,
+    values: Along<Recorded, f64>,
     held: Held<Recorded>,
+    /// The motion whose coefficients the registers of the plant in `along` hold, if they hold one.
+    motion: Option<u64>,
+    /// Number of motions so far.
+    motions: u64,
+}
+
+/// A motion of the plant: its number, and the states and inputs at its beginning.
+struct Motion<const M: usize> {
+    number: u64,
+    begin: Vec<Dual<M>>,
+}
+
+impl<const M: usize> Scratch<M> {
+    /// The number of another motion.
+    fn number(&mut self) -> u64 {
+        self.motions += 1;
+        self.motions
+    }
+
+    /// Computes the coefficients of the states and of all results of the plant, unless they are there.
+    fn follow(&mut self, motion: &Motion<M>, degree: usize) {
+        let Self { along: Along { flow, series, .. }, .. } = self;
+        if self.motion == Some(motion.number) {
+            return;
+        }
+        for (register, value) in motion.begin.iter().enumerate() {
+            series.set(register, 0, *value);
+        }
+        let equations = &mut flow.equations;
+        for k in 0..=degree {
+            equations.advance(series, k);
+            if k < degree {
+                for i in 0..equations.states() {
+                    let slope = series.get(equations.derivative(i), k);
+                    series.set(i, k + 1, slope * (1.0 / (k + 1) as f64));
+                }
+            }
+        }
+        self.motion = Some(motion.number);
+    }
 }
 
 struct Source<const M: usize> {
@@ -215,18 +292,49 @@ struct Source<const M: usize> {
     scratch: Arc<Mutex<Scratch<M>>>,
     equations: Recorded,
     n: usize,
+    /// The highest relative degree of all.
+    degree: usize,
 }
 
 impl<const M: usize> Source<M> {
     /// What `evaluate` does with the series of this barrier.
     fn along<T>(&self, evaluate: impl FnOnce(&mut Along<Recorded, Dual<M>>) -> T) -> T {
-        let along = &mut self.scratch.lock().along;
-        along.equations = self.equations.clone();
-        along.n = self.n;
-        evaluate(along)
+        let scratch = &mut *self.scratch.lock();
+        scratch.motion = None;
+        scratch.along.equations = self.equations.clone();
+        scratch.along.n = self.n;
+        evaluate(&mut scratch.along)
     }
 
-    /// The same with its values.
+    /// The same with its values alone.
+    fn values<T>(&self, evaluate: impl FnOnce(&mut Along<Recorded, f64>) -> T) -> T {
+        let values = &mut self.scratch.lock().values;
+        values.equations = self.equations.clone();
+        evaluate(values)
+    }
+
+    /// The coefficients of h up to `n` along a motion that begins at time `t`, as derivatives.
+    fn along_motion<T>(
+        &self,
+        t: f64,
+        motion: &Motion<M>,
+        n: usize,
+        write: impl FnOnce(&dyn Fn(usize) -> Dual<M>) -> T,
+    ) -> T {
+        let scratch = &mut *self.scratch.lock();
+        scratch.follow(motion, self.degree);
+        let along = &mut scratch.along;
+        along.series.set(motion.begin.len(), 0, Dual::from(t));
+        if let Some(own) = &self.equations.barrier {
+            for k in 0..=n {
+                along.series.advance(&own.steps, k);
+            }
+            along.h = own.h;
+        }
+        write(&|k| along.derivative(k))
+    }
+
+    /// The same with bounds on its values.
     fn held<T>(&self, evaluate: impl FnOnce(&mut Held<Recorded>) -> T) -> T {
         let held = &mut self.scratch.lock().held;
         let of_value = Recorded { of_value: true, ..self.equations.clone() };
@@ -272,33 +380,48 @@ impl<const M: usize> SharedPlant for Source<M> {
     }
 
     fn rooms(&self) -> [Box<dyn Any + Send>; 2] {
-        let arrival = vec![Dual::<M>::from(0.0); self.state_dim() + self.input_dim()];
-        [Box::new(vec![0.0; self.state_dim()]), Box::new(arrival)]
+        let begin = || vec![Dual::<M>::from(0.0); self.state_dim() + self.input_dim()];
+        let room = || Box::new(Motion { number: 0, begin: begin() });
+        [room(), room()]
     }
 
     fn motion(&self, x: &[f64], room: &mut dyn Any) {
-        let Some(begin) = room.downcast_mut::<Vec<f64>>() else { return };
-        begin.copy_from_slice(self.of_plant(x));
+        let Some(Motion { number, begin }) = room.downcast_mut::<Motion<M>>() else { return };
+        for (i, value) in begin.iter_mut().enumerate() {
+            *value = match x.get(i) {
+                Some(x) if i < self.state_dim() => Dual::from(*x),
+                _ => Dual::variable(0.0, i - self.state_dim()),
+            };
+        }
+        *number = self.scratch.lock().number();
     }
 
     fn evaluate_along(&self, t: f64, motion: &dyn Any, out: &mut Derivatives) {
-        match motion.downcast_ref::<Vec<f64>>() {
-            Some(begin) => self.evaluate(t, begin, out),
+        let Some(motion) = motion.downcast_ref::<Motion<M>>() else {
             // A room of other sources.
-            None => out.drift[self.n] = f64::NAN,
-        }
+            out.drift[self.n] = f64::NAN;
+            return;
+        };
+        self.along_motion(t, motion, self.n, |derivative| {
+            write_derivatives(out, self.n, self.input_dim(), derivative);
+        });
     }
 
     fn motion_ahead(&self, x: &[f64], u: &[f64], duration: f64, room: &mut dyn Any) {
-        let Some(arrival) = room.downcast_mut::<Vec<Dual<M>>>() else { return };
-        self.along(|along| along.motion_ahead(self.of_plant(x), u, duration, arrival));
+        let Some(Motion { number, begin }) = room.downcast_mut::<Motion<M>>() else { return };
+        let scratch = &mut *self.scratch.lock();
+        scratch.along.motion_ahead(self.of_plant(x), u, duration, begin);
+        *number = scratch.number();
     }
 
     fn ahead_of_row_along(&self, t: f64, motion: &dyn Any, out: &mut Ahead) {
-        match motion.downcast_ref::<Vec<Dual<M>>>() {
-            Some(arrival) => self.along(|along| along.ahead_along(t, arrival, out)),
-            None => out.value[self.n] = f64::NAN,
-        }
+        let Some(motion) = motion.downcast_ref::<Motion<M>>() else {
+            out.value[0] = f64::NAN;
+            return;
+        };
+        self.along_motion(t, motion, self.n - 1, |derivative| {
+            write(out, self.n - 1, self.input_dim(), derivative);
+        });
     }
 }
 
@@ -309,7 +432,33 @@ impl<const M: usize> Predict for Source<M> {
     }
 
     fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
-        self.along(|along| along.ahead_held(t, self.of_plant(x), u, duration, out));
+        self.along(|along| along.ahead_held(t, [self.of_plant(x), u], duration, self.n, out));
+    }
+
+    fn ahead_of_row(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
+        self.along(|along| along.ahead_held(t, [self.of_plant(x), u], duration, self.n - 1, out));
+    }
+
+    fn values_ahead(
+        &self,
+        t: f64,
+        x: &[f64],
+        u: &[f64],
+        duration: f64,
+        out: &mut [f64; MAX_RELATIVE_DEGREE + 1],
+    ) {
+        self.values(|values| values.values_ahead(t, [self.of_plant(x), u], duration, self.n, out));
+    }
+
+    fn values_of_row(
+        &self,
+        t: f64,
+        x: &[f64],
+        u: &[f64],
+        duration: f64,
+        out: &mut [f64; MAX_RELATIVE_DEGREE + 1],
+    ) {
+        self.values(|values| values.values_ahead(t, [self.of_plant(x), u], duration, self.n - 1, out));
     }
 
     fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]) {

@@ -81,6 +81,7 @@ pub(crate) fn source<E: Equations>(
         let (of_motion, of_barrier, of_value) = (along.of_motion(), along.of_barrier(), along.of_value());
         let work = Work::<E, M> {
             along: Along::new(plant, &of_barrier, n),
+            values: Along::new(plant, &of_barrier, n),
             flow: Flow::new(plant),
             along_tangent: Along::new(plant, &of_barrier, n),
             flow_tangent: Flow::new(plant),
@@ -151,6 +152,7 @@ struct Source<E, const M: usize> {
 /// Memory for evaluations at a sample and ahead of it.
 struct Work<E, const M: usize> {
     along: Along<E, Dual<M>>,
+    values: Along<E, f64>,
     flow: Flow<E, f64>,
     along_tangent: Along<E, Tangent<Dual<M>>>,
     flow_tangent: Flow<E, Tangent<f64>>,
@@ -241,7 +243,33 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
     }
 
     fn ahead(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
-        self.work.borrow_mut().along.ahead_held(t, &x[..self.states], u, duration, out);
+        self.work.borrow_mut().along.ahead_held(t, [&x[..self.states], u], duration, self.n, out);
+    }
+
+    fn ahead_of_row(&self, t: f64, x: &[f64], u: &[f64], duration: f64, out: &mut Ahead) {
+        self.work.borrow_mut().along.ahead_held(t, [&x[..self.states], u], duration, self.n - 1, out);
+    }
+
+    fn values_ahead(
+        &self,
+        t: f64,
+        x: &[f64],
+        u: &[f64],
+        duration: f64,
+        out: &mut [f64; MAX_RELATIVE_DEGREE + 1],
+    ) {
+        self.work.borrow_mut().values.values_ahead(t, [&x[..self.states], u], duration, self.n, out);
+    }
+
+    fn values_of_row(
+        &self,
+        t: f64,
+        x: &[f64],
+        u: &[f64],
+        duration: f64,
+        out: &mut [f64; MAX_RELATIVE_DEGREE + 1],
+    ) {
+        self.work.borrow_mut().values.values_ahead(t, [&x[..self.states], u], duration, self.n - 1, out);
     }
 
     fn rate(&self, x: &[f64], u: &[f64], out: &mut [f64]) {
@@ -254,7 +282,7 @@ impl<E: Equations, const M: usize> Predict for Source<E, M> {
         let path = &mut self.work.borrow_mut().path;
         path.flow.set_state(x[..self.states].iter().copied());
         path.flow.hold(u.iter().copied());
-        path.continue_from_flow(0.0);
+        path.continue_from_flow(0.0, path.n);
         let (own, others) = out.split_at_mut(self.states);
         for (i, out) in own.iter_mut().enumerate() {
             *out = std::array::from_fn(|k| path.series.get(i, k));

@@ -220,8 +220,9 @@ proptest! {
         let recorded = barriers.each_ref().map(punctual_models::Barrier::recorded);
         prop_assert_eq!(&recorded[0].0, &recorded[1].0);
         let plant = recorded[0].0.clone();
-        let tapes = recorded.into_iter().zip(degrees).map(|((_, tape), n)| (tape, n)).collect();
-        let found = punctual_models::recorded::sources(plant, tapes).expect("whole tapes");
+        let recording = punctual_models::recorded::Recording::new(plant, 500, 3).expect("a whole tape");
+        let found = recorded.into_iter().zip(degrees).map(|((_, tape), n)| recording.source(tape, n).expect("a whole tape"));
+        let found: Vec<_> = found.collect();
         for _ in 0..2 {
             for ((barrier, found), n) in barriers.iter().zip(&found).zip(degrees) {
                 let wanted = barrier.source(n).expect("in range");

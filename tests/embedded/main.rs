@@ -16,7 +16,6 @@ use std::path::Path;
 
 use draw::Draw;
 use punctual_core::filter::{Filter, Report, Status};
-use punctual_embedded::FilterFile;
 use punctual_fmu::configuration::{Configuration, FilterConfiguration};
 
 fn filter(text: &str) -> FilterConfiguration {
@@ -75,6 +74,8 @@ fn cases() -> Vec<Case> {
     let keys = "sampling = \"step_size\"\nactuation_delay = 0.05\nperiod_max = 0.03\narm_after = 0.5\nexperiment = { step_size = 0.02, stop_time = 20.0 }";
     add("late", vehicle(EXPRESSED, 3, keys, "deadline = 15.0\npenalty = 5.0", &mut draw), [0.02; 2], false);
     let pointwise = "sampling = \"pointwise\"\nexperiment = { step_size = 0.01, stop_time = 20.0 }";
+    let rates = "deadline = 15.0\nrates = [1.5, 2.5]\nmargin = 0.05\nrecovery = 2.0";
+    add("rates", vehicle(EXPRESSED, 2, pointwise, rates, &mut draw), [0.01; 2], false);
     let window = "deadline = 15.0\nmethod = \"repeated_root\"\nuntil_arrival = true";
     add("pointwise", vehicle(EXPRESSED, 2, pointwise, window, &mut draw), [0.01; 2], false);
     // A chain of three, and everything that an expression may have.
@@ -178,7 +179,7 @@ fn a_file_has_the_bits_of_its_filter() {
         let configuration = filter(&case.text);
         let bytes = configuration.embedded().expect("a file").to_bytes().expect("bytes");
         let mut wanted = configuration.build().expect("a filter");
-        let mut found = FilterFile::from_bytes(&bytes).and_then(FilterFile::into_filter).expect("a filter");
+        let mut found = punctual_embedded::read(&bytes).expect("a filter");
         let (states, inputs) = (configuration.plant.states().len(), configuration.plant.inputs().len());
         let count = samples(2_000);
         let mut record = folder.as_ref().map(|folder| {
@@ -224,7 +225,9 @@ fn a_vehicle_with_a_name_is_the_same_up_to_round_off() {
     let case = Case { name: "named", text, steps: [0.02; 2], told: false };
     let configuration = filter(&case.text);
     let mut wanted = configuration.build().expect("a filter");
-    let mut found = configuration.embedded().expect("a file").into_filter().expect("a filter");
+    let mut found =
+        punctual_embedded::read(&configuration.embedded().expect("a file").to_bytes().expect("bytes"))
+            .expect("a filter");
     let (mut same, mut all) = (0, 0);
     run(&case, [&mut wanted, &mut found], 3_000, |_, [a, b], [wanted, found]| {
         all += 1;

@@ -151,14 +151,19 @@ int main(int count, char **arguments) {
                    digest(filter, barriers) == wanted[1];
         if (!same && !wrong++) printf("step %lu differs: status %d, u %.17g not %.17g\n", (unsigned long)step, (int)report.status, u[0], expected[0]);
     }
-    printf("%zu barriers, %lu steps, %lu differ; memory %zu bytes, used %zu; saved %zu", barriers, (unsigned long)limit,
-           (unsigned long)wrong, size, used, room);
+    /* Not %zu, which small C libraries do not know. */
+    printf("%lu barriers, %lu steps, %lu differ; memory %lu bytes, used %lu; saved %lu", (unsigned long)barriers,
+           (unsigned long)limit, (unsigned long)wrong, (unsigned long)size, (unsigned long)used, (unsigned long)room);
 #ifdef BOARD
-    printf("; stack: load %zu, step %zu; instructions: mean %lu, longest %lu", load_stack, step_stack,
+    printf("; stack: load %lu, step %lu; instructions: mean %lu, longest %lu", (unsigned long)load_stack, (unsigned long)step_stack,
            (unsigned long)(total / (limit ? limit : 1)), (unsigned long)longest);
 #else
     (void)longest, (void)total, (void)load_stack;
 #endif
     printf("\n");
+    fclose(samples);
+    free(saved);
+    free(file);
+    for (int i = 0; i < 2; i++) free(memories[i]);
     return wrong != 0;
 }

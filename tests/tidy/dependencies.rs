@@ -34,9 +34,16 @@ fn crates_depend_on_crates_below_them_only() {
         ("reference/Cargo.toml", &["punctual-core"]),
         ("modeldescription/Cargo.toml", &[]),
         ("models/Cargo.toml", &["punctual-core"]),
+        ("embedded/Cargo.toml", &["punctual-core", "punctual-models"]),
         (
             "fmu/Cargo.toml",
-            &["punctual-core", "punctual-modeldescription", "punctual-models", "punctual-reference"],
+            &[
+                "punctual-core",
+                "punctual-embedded",
+                "punctual-modeldescription",
+                "punctual-models",
+                "punctual-reference",
+            ],
         ),
         ("cosim/Cargo.toml", &["punctual-core", "punctual-fmu", "punctual-modeldescription"]),
         ("pictures/Cargo.toml", &["punctual-core", "punctual-cosim", "punctual-fmu"]),
@@ -55,7 +62,8 @@ fn crates_depend_on_crates_below_them_only() {
                 "punctual-pictures",
                 "punctual-reference",
                 "punctual-study",
-                // The models, for benchmarks.
+                // The files of the C library, for tests, and the models, for benchmarks.
+                "punctual-embedded",
                 "punctual-models",
             ],
         ),
@@ -96,6 +104,7 @@ fn each_heavy_dependency_belongs_to_one_crate() {
         "reference/Cargo.toml",
         "modeldescription/Cargo.toml",
         "models/Cargo.toml",
+        "embedded/Cargo.toml",
         "fmu/Cargo.toml",
         "cosim/Cargo.toml",
         "pictures/Cargo.toml",
@@ -243,6 +252,15 @@ fn modules_of_the_models_use_modules_above_them() {
         Some(line.strip_prefix("//! | `")?.split('`').next()?.to_owned())
     });
     Order { folder: "models/src/", lines: documented }.check();
+}
+
+/// The order of the table in embedded/src/lib.rs.
+#[test]
+fn modules_of_the_c_library_use_modules_above_them() {
+    let documented = documented("embedded/src/lib.rs", |line| {
+        Some(line.strip_prefix("//! | `")?.split('`').next()?.to_owned())
+    });
+    Order { folder: "embedded/src/", lines: documented }.check();
 }
 
 /// The order of the table in python/src/lib.rs.

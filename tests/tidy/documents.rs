@@ -209,6 +209,19 @@ fn listed(markdown: &str) -> Vec<String> {
         .collect()
 }
 
+/// `tests/run` compiles the crate tests/no_std.
+#[test]
+fn the_loop_without_std_is_one_that_compiles() {
+    let code =
+        |line: &str| line.split("//").next().unwrap_or_default().trim().trim_start_matches("pub ").to_owned();
+    let compiled: Vec<_> = text("tests/no_std/src/lib.rs").lines().map(code).collect();
+    let blocks = blocks(text("docs/rust.md"), "rust");
+    let embedded = blocks.iter().find(|block| block.contains("timer's interrupt")).expect("a loop");
+    for line in embedded.lines().map(code).filter(|line| !line.is_empty()) {
+        assert!(compiled.contains(&line), "not in tests/no_std: {line}");
+    }
+}
+
 #[test]
 fn the_readme_has_the_two_commands_and_is_short() {
     let readme = text("README.md");

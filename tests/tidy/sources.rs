@@ -65,6 +65,7 @@ pub(crate) fn crates() -> impl Iterator<Item = &'static Source> {
         "reference/src/",
         "modeldescription/src/",
         "models/src/",
+        "embedded/src/",
         "fmu/src/",
         "cosim/src/",
         "pictures/src/",

@@ -477,13 +477,11 @@ impl Filter {
         let state = barriers * size_of::<FixedTimeState>() + sent * size_of::<Sent>() + 2 * ROUNDING;
         let row = size_of::<Row>() + size_of::<Enforcement>() + size_of::<Requirement>();
         let each = size_of::<BarrierSlot>() + size_of::<BarrierReport>() + 2 * numbers;
-        // Plants that share work are listed as they are found: four at first.
-        let plants = 2 * SharedPlants::SIZE * barriers.max(4);
         size_of::<Self>()
             + barriers * each
             + 3 * state
             + rows::most(barriers, period_max) * row
-            + plants
+            + SharedPlants::MEMORY
             + 12 * ROUNDING
     }
 }

@@ -422,6 +422,24 @@ impl Filter {
         Ok(())
     }
 
+    /// [`Self::restore`] without allocating, for a filter without plans: `write` fills a state of its own, whose lists have the room
+    /// that they need, and returns whether to take it over. Returns whether it was.
+    #[doc(hidden)]
+    pub fn restore_by(&mut self, write: impl FnOnce(&mut FilterState) -> bool) -> bool {
+        let Rows { state, workspace, delay, .. } = &mut self.rows;
+        let next = &mut workspace.next;
+        next.clone_rows_from(state);
+        let is_whole = write(next)
+            && next.barriers.len() == state.barriers.len()
+            && next.sent.len() <= MAX_SENT
+            && !(*delay > 0.0 && next.time.is_some() && next.sent.is_empty());
+        if is_whole {
+            next.integrated = self.integrator.as_ref().map_or(0.0, |own| own.limited(next.integrated));
+            state.clone_rows_from(next);
+        }
+        is_whole
+    }
+
     /// The report of the last [`Self::step`] or [`Self::peek`], on the input that it returned.
     pub fn report(&self) -> &Report {
         &self.rows.workspace.report

@@ -1,6 +1,6 @@
 //! A filter as a file for the C library.
 
-use punctual_embedded::{BarrierFile, FilterFile, Settings};
+use punctual_embedded::{BarrierFile, FilterFile, Promise, Settings};
 
 use super::{BarrierSection, ConfigurationError, FilterConfiguration, VariableSection};
 
@@ -54,10 +54,11 @@ impl FilterConfiguration {
             let (of_plant, tape) = barrier.recorded();
             plant.get_or_insert(of_plant);
             let (begin, end) = self.window(i)?;
+            let promise = Promise::of(&section.settings().map_err(|e| self.refused(i, &e))?);
             barriers.push(BarrierFile {
                 tape,
                 relative_degree: degree as u8,
-                settings: section.settings().map_err(|e| self.refused(i, &e))?,
+                promise,
                 begin,
                 end,
                 strictness: self.strictness(i)?,

@@ -10,7 +10,7 @@ use punctual_core::jet::Dual;
 use serde::de::{SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
-use super::{BarrierTape, Own, PlantTape, Source};
+use super::{Own, PlantTape, Source};
 use crate::operation::{Register, Step};
 
 /// What is kept of a list that is read, instead of its elements.
@@ -105,7 +105,7 @@ impl PlantSize {
     }
 }
 
-/// The size of a [`BarrierTape`], or the largest of several.
+/// The size of a [`BarrierTape`](super::BarrierTape), or the largest of several.
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
 pub struct BarrierSize {
     steps: Tallied<Steps>,
@@ -114,6 +114,11 @@ pub struct BarrierSize {
 }
 
 impl BarrierSize {
+    /// The number of its results.
+    pub fn results(&self) -> usize {
+        self.steps.0.registers
+    }
+
     /// The larger of both.
     pub fn max(self, other: Self) -> Self {
         let (Tallied(a), Tallied(b)) = (self.steps, other.steps);
@@ -125,8 +130,8 @@ impl BarrierSize {
 /// What an allocation takes beyond its bytes.
 const ROUNDING: usize = 2 * size_of::<usize>();
 
-/// The most bytes that the tapes and [`sources`](super::sources) take, for `count` barriers no larger than `largest` and of no
-/// higher relative degree than `degree`; `None` where that is no number.
+/// The most bytes that the tapes and their sources take, for `count` barriers no larger than `largest` and of no
+/// higher relative degree than `degree`, that are read one by one; `None` where that is no number.
 pub fn memory(plant: &PlantSize, count: usize, largest: &BarrierSize, degree: usize) -> Option<usize> {
     let PlantSize { states, inputs, steps: Tallied(of_plant), derivatives: Tallied(derivatives) } = plant;
     let (states, inputs, Tallied(own)) = (*states, *inputs, largest.steps);
@@ -134,34 +139,26 @@ pub fn memory(plant: &PlantSize, count: usize, largest: &BarrierSize, degree: us
     let before = states.checked_add(inputs)?.checked_add(1)?.checked_add(of_plant.registers)?;
     let registers = before.checked_add(own.registers)?;
     let orders = degree.checked_add(1)?;
-    // The tapes. Vectors that grow have up to twice their length, four at least.
     let of_plant_list = of_list(of_plant.steps)?;
     let plant = of_plant_list
         .checked_add(derivatives.0.checked_mul(size_of::<Register>())?)?
         .checked_add(size_of::<PlantTape>() + 4 * ROUNDING)?;
     let each = of_list(own.steps)?
-        .checked_add(of_list(of_plant.steps.checked_mul(2)?.max(4))?)?
-        .checked_add(
-            size_of::<Own>() + size_of::<Source<2>>() + size_of::<BarrierTape>() + 3 * size_of::<usize>(),
-        )?
-        .checked_add(6 * ROUNDING)?;
-    // What is needed for one barrier at a time: the registers that it reads, and marks.
-    let temporary = of_plant_list
-        .checked_mul(3)?
-        .checked_add(own.steps.checked_mul(9 * size_of::<Register>())?)?
-        .checked_add(registers)?
-        .checked_add(8 * ROUNDING)?;
+        .checked_add(of_plant_list)?
+        .checked_add(size_of::<Own>() + size_of::<Source<2>>() + 4 * ROUNDING)?;
+    // The marks for one barrier at a time, and the rooms with which plants are compared.
+    let temporary = before.checked_add(4 * (states + inputs) * size_of::<Dual<MAX_INPUTS>>())?;
     // The series, and the stages of the motion: of dual numbers, numbers and intervals.
     let dual =
         if inputs <= 2 && MAX_INPUTS > 4 { size_of::<Dual<2>>() } else { size_of::<Dual<MAX_INPUTS>>() };
     let stages = states.checked_mul(5)?.checked_add(before)?;
-    let of_duals = registers.checked_mul(orders)?.checked_add(stages)?.checked_add(states + inputs)?;
-    let of_numbers = registers.checked_add(stages)?.checked_add(3 * states)?;
+    let of_duals = registers.checked_mul(orders)?.checked_add(stages)?;
+    let of_numbers = registers.checked_add(stages)?.checked_add(states)?;
     let of_intervals = registers.checked_mul(2)?.checked_add(stages)?.checked_add(2 * states)?;
     let series = of_duals
         .checked_mul(dual)?
         .checked_add(of_numbers.checked_mul(size_of::<f64>())?)?
         .checked_add(of_intervals.checked_mul(size_of::<Interval>())?)?
-        .checked_add(size_of::<super::Scratch<2>>() + 30 * ROUNDING)?;
+        .checked_add(size_of::<super::Scratch<2>>() + 24 * ROUNDING)?;
     count.checked_mul(each)?.checked_add(plant)?.checked_add(temporary)?.checked_add(series)
 }

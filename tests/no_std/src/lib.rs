@@ -2,16 +2,12 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-extern crate alloc;
-
 use core::array::from_fn;
-
-use alloc::boxed::Box;
 
 use punctual_core::Error;
 use punctual_core::barriers::DistanceDisc;
 use punctual_core::dynamics::ControlAffine;
-use punctual_core::filter::{BarrierSettings, Filter, Status};
+use punctual_core::filter::{BarrierSettings, Filter};
 use punctual_core::scalar::Scalar;
 
 #[panic_handler]
@@ -32,19 +28,19 @@ impl ControlAffine<4, 2> for PointMass {
     }
 }
 
-/// A filter that reaches a disc: that of docs/rust.md.
+/// A filter that reaches a disc: that of docs/rust.md, whose lines these are.
 ///
 /// # Errors
 ///
 /// None: the numbers are in range.
-pub fn filter() -> Result<Box<Filter>, Error> {
+pub fn filter() -> Result<Filter, Error> {
     let goal = DistanceDisc::new([45.0, 45.0], 2.0, 2.0)?;
     let mut filter = Filter::builder(PointMass)
         .barrier("goal", goal, BarrierSettings::within(10.0))?
         .bounds(&[-4.0, -4.0], &[4.0, 4.0])?
         .build()?;
     filter.expect_hold(Some(0.01))?;
-    Ok(Box::new(filter))
+    Ok(filter)
 }
 
 /// One step of it.
@@ -52,6 +48,8 @@ pub fn filter() -> Result<Box<Filter>, Error> {
 /// # Errors
 ///
 /// None: the lengths are right.
-pub fn step(filter: &mut Filter, t: f64, x: &[f64; 4], u: &mut [f64; 2]) -> Result<Status, Error> {
-    Ok(filter.step(t, x, &[0.0; 2], u)?.status)
+pub fn step(filter: &mut Filter, t: f64, x: &[f64; 4], wanted: &[f64; 2]) -> Result<[f64; 2], Error> {
+    let mut u = [0.0; 2];
+    filter.step(t, x, wanted, &mut u)?;
+    Ok(u)
 }

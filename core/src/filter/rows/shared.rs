@@ -66,8 +66,8 @@ type Source<'a> = (&'a dyn DerivativeSource, Option<usize>);
 pub(crate) struct SharedPlants(Vec<Plant>);
 
 impl SharedPlants {
-    /// The bytes of one plant.
-    pub(crate) const SIZE: usize = size_of::<Plant>();
+    /// The most bytes of the list for the barriers along one plant, as it grows: four plants, then eight.
+    pub(crate) const MEMORY: usize = 12 * size_of::<Plant>();
 
     /// Finds the plants that the sources of `slots` share, and gives each source the number of its plant.
     pub(crate) fn of(slots: &mut [BarrierSlot]) -> Self {
