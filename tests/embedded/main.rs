@@ -74,6 +74,9 @@ fn cases() -> Vec<Case> {
     let keys = "sampling = \"step_size\"\nactuation_delay = 0.05\nperiod_max = 0.03\narm_after = 0.5\nexperiment = { step_size = 0.02, stop_time = 20.0 }";
     add("late", vehicle(EXPRESSED, 3, keys, "deadline = 15.0\npenalty = 5.0", &mut draw), [0.02; 2], false);
     let pointwise = "sampling = \"pointwise\"\nexperiment = { step_size = 0.01, stop_time = 20.0 }";
+    let kilohertz = "sampling = \"pointwise\"\nexperiment = { step_size = 0.001, stop_time = 20.0 }";
+    let margin = "deadline = 15.0\nmargin = 0.01";
+    add("pointwise_10", vehicle(EXPRESSED, 10, kilohertz, margin, &mut draw), [0.001; 2], false);
     let rates = "deadline = 15.0\nrates = [1.5, 2.5]\nmargin = 0.05\nrecovery = 2.0";
     add("rates", vehicle(EXPRESSED, 2, pointwise, rates, &mut draw), [0.01; 2], false);
     let window = "deadline = 15.0\nmethod = \"repeated_root\"\nuntil_arrival = true";
