@@ -94,7 +94,7 @@ derivatives = { p = \"w\", w = \"b - c*tanh(w)*abs(w)\", b = \"jerk - exp(-2 - b
 
 /// The wanted input of a step: nothing, something at random that is held for a while, as much as possible, or what is no number.
 fn wanted(draw: &mut Draw, step: usize, u_ref: &mut [f64]) {
-    if step % 64 == 0 {
+    if step.is_multiple_of(64) {
         let kind = draw.uniform(0.0, 5.0) as u32;
         for u in u_ref.iter_mut() {
             *u = match kind {
@@ -139,7 +139,7 @@ fn run(
     let (mut t, mut x, mut u_ref) = (0.0, vec![0.0; states], vec![0.0; inputs]);
     let [a, b] = pair;
     for step in 0..samples {
-        let again = step % 20_000 == 0;
+        let again = step.is_multiple_of(20_000);
         if again {
             t = draw.uniform(0.0, 3.0);
             x.iter_mut().enumerate().for_each(|(i, x)| *x = draw.uniform(-0.5, 0.5) + f64::from(i == 3));
