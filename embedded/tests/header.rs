@@ -57,6 +57,7 @@ fn made() -> String {
         },
         ..Config::default()
     };
+    config.export.exclude = vec!["rust_eh_personality".to_owned()];
     for (from, to) in [
         ("PunctualFilter", "punctual_filter"),
         ("PunctualResult", "punctual_result"),
