@@ -2,8 +2,8 @@
  *
  *     damaged COUNT FILE...
  *
- * Each is read from memory that ends where the file does, so that a sanitizer sees what is read beyond. What is accepted is stepped
- * a few times, saved and restored. */
+ * Each is read from memory that ends where the file does, so that valgrind sees what is read beyond; sanitizers see this file alone,
+ * since the library is not compiled with them. What is accepted is stepped a few times, saved and restored. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
