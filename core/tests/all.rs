@@ -20,6 +20,7 @@ mod convergence_stay;
 mod degree;
 mod external;
 mod filter;
+mod follower;
 mod following;
 mod horizon;
 mod infeasible;

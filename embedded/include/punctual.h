@@ -52,6 +52,22 @@ enum punctual_phase {
   PUNCTUAL_RELEASED = 5,
 };
 
+/* Whether the plan of the file is followed. */
+enum punctual_plan {
+  /* no step was taken, or there is no plan */
+  PUNCTUAL_PLAN_NOT_BEGUN = 0,
+  /* the plan decides: its promises are kept, whatever u_ref comes */
+  PUNCTUAL_PLAN_KEPT = 1,
+  /* the plan has ended: the rows decide */
+  PUNCTUAL_PLAN_ENDED = 2,
+  /* the first state is outside the starts of the plan: the rows decide */
+  PUNCTUAL_PLAN_OUT_OF_START = 3,
+  /* the state is where the declared plant cannot be: the rows decide */
+  PUNCTUAL_PLAN_OUT_OF_TUBE = 4,
+  /* no step came when a hold of the plan began: the rows decide */
+  PUNCTUAL_PLAN_LATE = 5,
+};
+
 
 // What a function returns: 0, or why it did nothing.
 typedef enum punctual_result {
@@ -76,7 +92,7 @@ typedef enum punctual_result {
   PUNCTUAL_RESULT_BUSY = 8,
 } punctual_result;
 
-// A filter. It lives in the memory that `punctual_load` was given.
+// A filter. It lives in the memory that `punctual_load` was given, its plan in the file.
 typedef struct punctual_filter punctual_filter;
 
 // What a step did.
@@ -87,6 +103,10 @@ typedef struct punctual_report {
   uint32_t iterations;
   // The period in s over which the rows hold, 0 if at the sample alone.
   double period;
+  // Whether a plan is followed, and why not: `PUNCTUAL_PLAN_KEPT` and so on.
+  int32_t plan;
+  // The time in s until which the promises of the plan are kept, whatever `u_ref` comes; 0 if none is followed.
+  double guaranteed_until;
 } punctual_report;
 
 // What a step found of one barrier.
@@ -109,6 +129,8 @@ typedef struct punctual_barrier_report {
   bool deadline_unreachable;
   // Whether other barriers keep it from its goal.
   bool deadlocked;
+  // Whether the plan keeps its promise, whatever `u_ref` comes.
+  bool guaranteed;
 } punctual_barrier_report;
 
 #ifdef __cplusplus
@@ -118,7 +140,8 @@ extern "C" {
 // The number of bytes that a filter needs, in `*size`.
 enum punctual_result punctual_size(const void *file, size_t file_size, size_t *size);
 
-// Makes the filter of `file` in `memory`, which it keeps; `file` may go. The only function that allocates, and only there.
+// Makes the filter of `file` in `memory`, which it keeps. If the file has a plan, it is used where it is, in flash for example, and
+// has to stay as it is; otherwise it may go. The only function that allocates, and only in `memory`.
 enum punctual_result punctual_load(void *memory,
                                    size_t memory_size,
                                    const void *file,
@@ -150,7 +173,7 @@ enum punctual_result punctual_barrier(const struct punctual_filter *filter,
                                       size_t index,
                                       struct punctual_barrier_report *barrier);
 
-// Forgets what was promised: the next step starts every deadline again.
+// Forgets what was promised: the next step starts every deadline again, and the plan.
 enum punctual_result punctual_rearm(struct punctual_filter *filter);
 
 // The most bytes that `punctual_save` writes; 0 for null.

@@ -13,14 +13,14 @@ use core::slice;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use linked_list_allocator::Heap;
-use punctual_core::filter::{Filter, Phase};
+use punctual_core::filter::Phase;
 
 use crate::memory::Size;
-use crate::{FileError, saved};
+use crate::{FileError, Loaded, saved};
 
-/// A filter. It lives in the memory that `punctual_load` was given.
+/// A filter. It lives in the memory that `punctual_load` was given, its plan in the file.
 pub struct PunctualFilter {
-    filter: Filter,
+    loaded: Loaded<'static>,
     states: usize,
     inputs: usize,
 }
@@ -71,6 +71,10 @@ pub struct PunctualReport {
     pub iterations: u32,
     /// The period in s over which the rows hold, 0 if at the sample alone.
     pub period: f64,
+    /// Whether a plan is followed, and why not: `PUNCTUAL_PLAN_KEPT` and so on.
+    pub plan: i32,
+    /// The time in s until which the promises of the plan are kept, whatever `u_ref` comes; 0 if none is followed.
+    pub guaranteed_until: f64,
 }
 
 /// What a step found of one barrier.
@@ -95,6 +99,8 @@ pub struct PunctualBarrier {
     pub deadline_unreachable: bool,
     /// Whether other barriers keep it from its goal.
     pub deadlocked: bool,
+    /// Whether the plan keeps its promise, whatever `u_ref` comes.
+    pub guaranteed: bool,
 }
 
 /// The memory of the filter that is being loaded; nothing else allocates.
@@ -189,11 +195,13 @@ pub unsafe extern "C" fn punctual_size(
     }
 }
 
-/// Makes the filter of `file` in `memory`, which it keeps; `file` may go. The only function that allocates, and only there.
+/// Makes the filter of `file` in `memory`, which it keeps. If the file has a plan, it is used where it is, in flash for example, and
+/// has to stay as it is; otherwise it may go. The only function that allocates, and only in `memory`.
 ///
 /// # Safety
 ///
-/// `memory` and `file` are null or point to as many bytes, those of `memory` used by nothing else as long as the filter is.
+/// `memory` and `file` are null or point to as many bytes, those of `memory` used by nothing else as long as the filter is, those of
+/// `file` unchanged.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn punctual_load(
     memory: *mut c_void,
@@ -224,7 +232,7 @@ pub unsafe extern "C" fn punctual_load(
     *heap = Heap::empty();
     // SAFETY: it is valid as long as the filter is, and no block of the heap is freed later.
     unsafe { heap.init(memory.as_mut_ptr().cast(), memory.len()) };
-    let made = crate::read(file).map(|filter| Box::new(PunctualFilter { filter, states, inputs }));
+    let made = crate::read(file).map(|loaded| Box::new(PunctualFilter { loaded, states, inputs }));
     let result = match made {
         Ok(made) => {
             *filter = Box::into_raw(made);
@@ -252,7 +260,7 @@ pub unsafe extern "C" fn punctual_dimensions(
 ) -> PunctualResult {
     // SAFETY: by the caller.
     let Some(own) = (unsafe { filter.as_ref() }) else { return PunctualResult::Pointer };
-    let numbers = [own.states, own.inputs, own.filter.report().barriers.len()];
+    let numbers = [own.states, own.inputs, own.loaded.filter.report().barriers.len()];
     for (to, number) in [states, inputs, barriers].into_iter().zip(numbers) {
         // SAFETY: by the caller.
         if let Some(to) = unsafe { to.as_mut() } {
@@ -271,7 +279,7 @@ pub unsafe extern "C" fn punctual_dimensions(
 pub unsafe extern "C" fn punctual_expect_hold(filter: *mut PunctualFilter, seconds: f64) -> PunctualResult {
     // SAFETY: by the caller.
     let Some(own) = (unsafe { filter.as_mut() }) else { return PunctualResult::Pointer };
-    match own.filter.expect_hold((seconds != 0.0).then_some(seconds)) {
+    match own.loaded.filter.expect_hold((seconds != 0.0).then_some(seconds)) {
         Ok(()) => PunctualResult::Ok,
         Err(_) => PunctualResult::Argument,
     }
@@ -306,15 +314,21 @@ pub unsafe extern "C" fn punctual_step(
     let mut asked = [0.0; punctual_core::MAX_INPUTS];
     let mut safe = asked;
     asked[..inputs].copy_from_slice(wanted);
-    let Ok(found) = own.filter.step(t, x, &asked[..inputs], &mut safe[..inputs]) else {
+    let Ok(found) = own.loaded.step(t, x, &asked[..inputs], &mut safe[..inputs]) else {
         return PunctualResult::Argument;
     };
     // SAFETY: by the caller.
     unsafe { ptr::copy_nonoverlapping(safe.as_ptr(), u, inputs) };
     // SAFETY: by the caller.
     if let Some(report) = unsafe { report.as_mut() } {
-        let (status, iterations, period) = (found.status as i32, found.iterations, found.period);
-        *report = PunctualReport { status, iterations, period };
+        let follower = own.loaded.follower.as_ref();
+        *report = PunctualReport {
+            status: found.status as i32,
+            iterations: found.iterations,
+            period: found.period,
+            plan: follower.map_or(0, |follower| follower.state().following as i32),
+            guaranteed_until: own.loaded.until().unwrap_or(0.0),
+        };
     }
     PunctualResult::Ok
 }
@@ -333,7 +347,7 @@ pub unsafe extern "C" fn punctual_barrier(
     // SAFETY: by the caller.
     let (own, barrier) = (unsafe { filter.as_ref() }, unsafe { barrier.as_mut() });
     let (Some(own), Some(barrier)) = (own, barrier) else { return PunctualResult::Pointer };
-    let Some(found) = own.filter.report().barriers.get(index) else { return PunctualResult::Argument };
+    let Some(found) = own.loaded.filter.report().barriers.get(index) else { return PunctualResult::Argument };
     *barrier = PunctualBarrier {
         h: found.h,
         time_left: found.time_left,
@@ -344,6 +358,7 @@ pub unsafe extern "C" fn punctual_barrier(
         on_course: found.on_course,
         deadline_unreachable: found.deadline_unreachable,
         deadlocked: found.deadlocked,
+        guaranteed: own.loaded.is_guaranteed(index),
     };
     PunctualResult::Ok
 }
@@ -352,7 +367,7 @@ fn phase(phase: Phase) -> i32 {
     phase as i32
 }
 
-/// Forgets what was promised: the next step starts every deadline again.
+/// Forgets what was promised: the next step starts every deadline again, and the plan.
 ///
 /// # Safety
 ///
@@ -361,7 +376,7 @@ fn phase(phase: Phase) -> i32 {
 pub unsafe extern "C" fn punctual_rearm(filter: *mut PunctualFilter) -> PunctualResult {
     // SAFETY: by the caller.
     let Some(own) = (unsafe { filter.as_mut() }) else { return PunctualResult::Pointer };
-    own.filter.rearm();
+    own.loaded.rearm();
     PunctualResult::Ok
 }
 
@@ -373,7 +388,7 @@ pub unsafe extern "C" fn punctual_rearm(filter: *mut PunctualFilter) -> Punctual
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn punctual_saved_size(filter: *const PunctualFilter) -> usize {
     // SAFETY: by the caller.
-    unsafe { filter.as_ref() }.map_or(0, |own| saved::size(own.filter.state()))
+    unsafe { filter.as_ref() }.map_or(0, |own| saved::size(own.loaded.filter.state()))
 }
 
 /// Writes what the filter remembers to `buffer`, and the number of bytes to `*written`.
@@ -396,7 +411,8 @@ pub unsafe extern "C" fn punctual_save(
     };
     // SAFETY: by the caller.
     let buffer = unsafe { slice::from_raw_parts_mut(buffer.cast::<u8>(), size) };
-    match saved::write(own.filter.state(), buffer) {
+    let follower = own.loaded.follower.as_ref().map(|follower| *follower.state());
+    match saved::write(own.loaded.filter.state(), follower, buffer) {
         Some(length) => {
             *written = length;
             PunctualResult::Ok
@@ -419,8 +435,11 @@ pub unsafe extern "C" fn punctual_restore(
     // SAFETY: by the caller.
     let (own, buffer) = (unsafe { filter.as_mut() }, unsafe { given(buffer.cast::<u8>(), size) });
     let (Some(own), Some(buffer)) = (own, buffer) else { return PunctualResult::Pointer };
-    match own.filter.restore_by(|state| saved::read(buffer, state).is_some()) {
-        true => PunctualResult::Ok,
-        false => PunctualResult::Damaged,
-    }
+    let Loaded { filter, follower, .. } = &mut own.loaded;
+    let restored = filter.restore_by(|state| match (saved::read(buffer, state), follower) {
+        (Some(None), None) => true,
+        (Some(Some(state)), Some(follower)) => follower.restore(state),
+        _ => false,
+    });
+    if restored { PunctualResult::Ok } else { PunctualResult::Damaged }
 }

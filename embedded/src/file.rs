@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::checksum::checksum;
 
 /// The first bytes of a file: what it is, and the version of its format.
-const MAGIC: [u8; 8] = *b"PUNCTL\x00\x01";
+const MAGIC: [u8; 8] = *b"PUNCTL\x00\x02";
 /// Of the head: the magic, the length of what follows and its CRC-32, both little-endian.
 const HEAD: usize = 16;
 
@@ -29,6 +29,8 @@ pub struct FilterFile {
     pub plant: PlantTape,
     /// The barriers, at least one.
     pub barriers: Vec<BarrierFile>,
+    /// The bytes of a [`PlanTable`](punctual_core::follower::PlanTable); empty for rows alone.
+    pub plan: Vec<u8>,
 }
 
 /// Bounds and times of a filter, as its [builder](punctual_core::filter::FilterBuilder) takes them.
@@ -63,6 +65,8 @@ pub struct BarrierFile {
     pub end: End,
     /// What becomes of it where not all can be met.
     pub strictness: Strictness,
+    /// Whether the plan keeps it.
+    pub is_planned: bool,
 }
 
 /// The settings of a promise, as numbers that are read without allocating.

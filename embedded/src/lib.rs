@@ -2,14 +2,14 @@
 //!
 //! `punctual build car.toml --embedded car.bin` writes a [`FilterFile`]: the model and its barriers as tapes, the promises, the
 //! bounds. One library reads them all. It has the rows of a filter, and the same bits as [`Filter`](punctual_core::filter::Filter)
-//! on the same expressions. It has no plans.
+//! on the same expressions. A plan is a table that was made on a PC, and is followed.
 //!
 //! | module | owns |
 //! |---|---|
 //! | `checksum` | whether bytes are those that were written |
 //! | `file` | the file |
 //! | `memory` | how much memory its filter takes |
-//! | `read` | its filter |
+//! | `read` | its filter, and how its plan is followed |
 //! | `saved` | what a filter remembers, as bytes |
 //! | `abi` | the functions of `punctual.h` (feature `c`) |
 #![no_std]
@@ -29,4 +29,4 @@ mod saved;
 
 pub use file::{BarrierFile, FileError, FilterFile, Promise, Settings};
 pub use memory::Size;
-pub use read::read;
+pub use read::{Loaded, Step, read};

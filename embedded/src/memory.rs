@@ -24,6 +24,7 @@ struct One {
     _begin: Begin,
     _end: End,
     _strictness: Strictness,
+    _is_planned: bool,
 }
 
 #[derive(Default)]

@@ -5,6 +5,7 @@ use core::mem::size_of;
 use punctual_core::MAX_INPUTS;
 use punctual_core::convergence::FixedTimeState;
 use punctual_core::filter::{Curvature, FilterState, MAX_SENT, Sent};
+use punctual_core::follower::FollowerState;
 use serde::{Deserialize, Serialize};
 
 use crate::checksum::checksum;
@@ -23,6 +24,7 @@ struct Numbers {
     start: Option<f64>,
     curvatures: [Option<Curvature>; 2],
     integrated: f64,
+    follower: Option<FollowerState>,
 }
 
 /// The most bytes of a value with the size of `T`: numbers of 32 bits take up to 5.
@@ -37,8 +39,13 @@ pub(crate) fn size(state: &FilterState) -> usize {
         + state.sent.capacity().min(MAX_SENT) * most::<Sent>()
 }
 
-/// Writes `state` to `buffer`. Returns the number of bytes, or nothing if there is no room.
-pub(crate) fn write(state: &FilterState, buffer: &mut [u8]) -> Option<usize> {
+/// Writes `state`, and that of the follower if there is one, to `buffer`. Returns the number of bytes, or nothing if there is
+/// no room.
+pub(crate) fn write(
+    state: &FilterState,
+    follower: Option<FollowerState>,
+    buffer: &mut [u8],
+) -> Option<usize> {
     let (head, content) = buffer.split_first_chunk_mut::<HEAD>()?;
     let numbers = Numbers {
         barriers: u8::try_from(state.barriers.len()).ok()?,
@@ -49,6 +56,7 @@ pub(crate) fn write(state: &FilterState, buffer: &mut [u8]) -> Option<usize> {
         start: state.start,
         curvatures: state.curvatures,
         integrated: state.integrated,
+        follower,
     };
     let mut length = postcard::to_slice(&numbers, content).ok()?.len();
     for promise in &state.barriers {
@@ -61,8 +69,9 @@ pub(crate) fn write(state: &FilterState, buffer: &mut [u8]) -> Option<usize> {
     Some(HEAD + length)
 }
 
-/// Reads what [`write`] wrote into a `state` with as many barriers. Returns whether it is whole.
-pub(crate) fn read(bytes: &[u8], state: &mut FilterState) -> Option<()> {
+/// Reads what [`write`] wrote into a `state` with as many barriers. Returns that of the follower, if there is one; nothing if
+/// the bytes are not whole.
+pub(crate) fn read(bytes: &[u8], state: &mut FilterState) -> Option<Option<FollowerState>> {
     let (head, content) = bytes.split_first_chunk::<HEAD>()?;
     if u32::from_le_bytes(*head) != checksum(content) {
         return None;
@@ -84,5 +93,5 @@ pub(crate) fn read(bytes: &[u8], state: &mut FilterState) -> Option<()> {
     (state.time, state.period, state.input) = (numbers.time, numbers.period, numbers.input);
     (state.start, state.curvatures, state.integrated) =
         (numbers.start, numbers.curvatures, numbers.integrated);
-    Some(())
+    Some(numbers.follower)
 }

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use cbindgen::{Builder, Config, DocumentationStyle, EnumConfig, Language, RenameRule, Style};
 use punctual_core::filter::{Phase, Status};
+use punctual_core::follower::Following;
 
 const ABOUT: &str = "\
 /* Punctual: fixed-time safety filters, without an operating system.
@@ -14,11 +15,7 @@ const ABOUT: &str = "\
    know of each other. This file is made by cbindgen. */";
 
 /// An enumeration of numbers that have a name and a meaning.
-fn enumeration(
-    name: &str,
-    about: &str,
-    values: impl Iterator<Item = (i32, &'static str, &'static str)>,
-) -> String {
+fn enumeration<'a>(name: &str, about: &str, values: impl Iterator<Item = (i32, &'a str, &'a str)>) -> String {
     let mut text = format!("/* {about} */\nenum punctual_{name} {{\n");
     for (number, word, meaning) in values {
         let word = word.to_uppercase();
@@ -38,12 +35,18 @@ fn made() -> String {
         "Where the promise of a barrier is; numbered as in the FMU.",
         Phase::ALL.into_iter().map(|p| (p as i32, p.name(), p.meaning())),
     );
+    let following = Following::ALL.map(|f| (f as i32, format!("plan_{}", f.name()), f.meaning()));
+    let plan = enumeration(
+        "plan",
+        "Whether the plan of the file is followed.",
+        following.iter().map(|(number, word, meaning)| (*number, word.as_str(), *meaning)),
+    );
     let mut config = Config {
         language: Language::C,
         cpp_compat: true,
         include_guard: Some("PUNCTUAL_H".to_owned()),
         header: Some(ABOUT.to_owned()),
-        after_includes: Some(format!("\n{status}\n{phase}")),
+        after_includes: Some(format!("\n{status}\n{phase}\n{plan}")),
         documentation_style: DocumentationStyle::C99,
         style: Style::Both,
         no_includes: true,

@@ -3,10 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use punctual_core::filter::TabledPlan;
+use punctual_core::follower::PlanTable;
 use punctual_cosim::coupling::Order;
 use punctual_cosim::error::Error;
 use punctual_cosim::{package, whole};
-use punctual_fmu::configuration::{Configuration, FmiVersion};
+use punctual_fmu::configuration::{Configuration, FilterConfiguration, FmiVersion};
+
+use punctual_fmu::text::{number, quantity};
 use punctual_modeldescription::SspVersion;
 
 use crate::output;
@@ -153,8 +157,8 @@ fn embed(arguments: &Arguments, to: &Path) -> Result<ExitCode, Error> {
         let message = format!("is for a filter, and {} is a {}", file.display(), configuration.kind());
         return Err(Error::configuration("--embedded", message));
     };
-    let bytes = filter.embedded().map_err(|e| Error::from(e).in_file(file))?;
-    let bytes = bytes.to_bytes().map_err(|e| Error::configuration("--embedded", e.to_string()))?;
+    let (embedded, plan) = filter.embedded().map_err(|e| Error::from(e).in_file(file))?;
+    let bytes = embedded.to_bytes().map_err(|e| Error::configuration("--embedded", e.to_string()))?;
     let header = to.with_extension("h");
     if header == to {
         let message =
@@ -173,7 +177,32 @@ fn embed(arguments: &Arguments, to: &Path) -> Result<ExitCode, Error> {
         bytes.len(),
         header.display(),
     ));
+    if let Some(plan) = plan {
+        output::result(&planned(filter, &plan)?);
+    }
     Ok(ExitCode::SUCCESS)
+}
+
+/// What a plan as a table keeps, in words.
+fn planned(filter: &FilterConfiguration, plan: &TabledPlan) -> Result<String, Error> {
+    let table =
+        PlanTable::read(&plan.bytes).map_err(|e| Error::configuration("--embedded", e.to_string()))?;
+    let kept = filter.barrier.iter().zip(&plan.promised);
+    let named = |kept: &[&str]| if kept.is_empty() { "none".to_owned() } else { kept.join(", ") };
+    let [kept, left]: [Vec<&str>; 2] = [true, false]
+        .map(|is_kept| kept.clone().filter(|(_, k)| **k == is_kept).map(|(b, _)| b.name.as_str()).collect());
+    let free = (filter.plant.inputs().iter().zip(&plan.freedom))
+        .map(|(input, freedom)| format!("{} {}", input.name, quantity(*freedom, &input.unit)))
+        .collect::<Vec<_>>();
+    let left = if left.is_empty() { String::new() } else { format!(" (not {})", left.join(", ")) };
+    Ok(format!(
+        "plan: {} holds in {} bytes keep {}{left} for {} s from every start; inputs may follow u_ref within {}",
+        table.holds(),
+        plan.bytes.len(),
+        named(&kept),
+        number(table.until()),
+        free.join(", "),
+    ))
 }
 
 /// The file for FMI 3.0 next to the one for 2.0.

@@ -16,6 +16,8 @@ use std::path::Path;
 
 use draw::Draw;
 use punctual_core::filter::{Filter, Report, Status};
+use punctual_core::follower::{Follower, Following, PlanTable};
+use punctual_embedded::Loaded;
 use punctual_fmu::configuration::{Configuration, FilterConfiguration};
 
 fn filter(text: &str) -> FilterConfiguration {
@@ -57,6 +59,8 @@ struct Case {
     /// The range of steps in s, and whether the filter is told each before.
     steps: [f64; 2],
     told: bool,
+    /// How far a start may be from (0, 0, 0, 1), in units of each state.
+    spread: f64,
 }
 
 fn cases() -> Vec<Case> {
@@ -65,7 +69,7 @@ fn cases() -> Vec<Case> {
     let tenth = "experiment = { step_size = 0.1, stop_time = 20.0 }";
     let deadline = "deadline = 15.0";
     let mut cases = Vec::new();
-    let mut add = |name, text, steps, told| cases.push(Case { name, text, steps, told });
+    let mut add = |name, text, steps, told| cases.push(Case { name, text, steps, told, spread: 0.5 });
     for (name, obstacles) in [("unicycle_1", 1), ("unicycle_5", 5), ("unicycle_10", 10)] {
         add(name, vehicle(EXPRESSED, obstacles, kilohertz, deadline, &mut draw), [0.001; 2], false);
     }
@@ -89,6 +93,14 @@ derivatives = { p = \"w\", w = \"b - c*tanh(w)*abs(w)\", b = \"jerk - exp(-2 - b
 [[barrier]]\nname = \"past\"\nexpression = \"p - 10 - 0.2*sin(0.3*t)\"\ndeadline = 8.0\nprofile = \"low_peak\"
 [[barrier]]\nname = \"before\"\nexpression = \"30 - p\"\nbegin = 1.0\ndeadline = 9.0\npriority = 2\n";
     add("chain", text.to_owned(), [0.05; 2], false);
+    // A plan, whose starts are a little more than those that are drawn.
+    let keys = format!(
+        "{pointwise}\nx0 = {{ v = 1.0 }}\n[uncertainty]\nrates = {{ v = 0.05 }}\n
+[follower]\nstart = {{ x_p = 0.06, y_p = 0.06, theta = 0.06, v = 0.06 }}\n"
+    );
+    let text = vehicle(EXPRESSED, 10, "", margin, &mut Draw::new(7));
+    let text = text.replace("assurance = \"off\"", "").replace("[plant]", &format!("{keys}[plant]"));
+    cases.push(Case { name: "planned_10", text, steps: [0.01; 2], told: false, spread: 0.05 });
     cases
 }
 
@@ -112,11 +124,12 @@ fn fold(digest: u64, number: f64) -> u64 {
     (digest.rotate_left(5) ^ bits).wrapping_mul(0x0000_0100_0000_01b3)
 }
 
-/// Everything that `punctual_barrier` reports of all barriers, in one number; tests/embedded/replay.c has the same.
-fn digest(report: &Report) -> u64 {
-    let mut digest = 0;
-    for b in &report.barriers {
-        let flags = [b.on_course, b.deadline_unreachable, b.deadlocked].map(f64::from);
+/// Everything that `punctual_step` reports of the plan and `punctual_barrier` of all barriers, in one number; tests/embedded/replay.c
+/// has the same.
+fn digest(report: &Report, following: Following, until: f64, is_guaranteed: impl Fn(usize) -> bool) -> u64 {
+    let mut digest = fold(fold(0, f64::from(following as u8)), until);
+    for (i, b) in report.barriers.iter().enumerate() {
+        let flags = [b.on_course, b.deadline_unreachable, b.deadlocked, is_guaranteed(i)].map(f64::from);
         let arrival = b.arrival_time.unwrap_or(f64::NAN);
         let numbers =
             [b.h, b.time_left, b.slack, arrival, f64::from(b.phase as u8), f64::from(b.unmet_steps)];
@@ -125,12 +138,74 @@ fn digest(report: &Report) -> u64 {
     digest
 }
 
-/// Runs two filters side by side through `samples` steps, starting again now and then; `judge` sees each step.
+/// The filter of a configuration, and a follower of its plan.
+struct Apart<'a> {
+    rows: Filter,
+    follower: Option<Follower<'a>>,
+    promised: &'a [bool],
+}
+
+/// A filter with or without a plan.
+trait Way {
+    fn rearm(&mut self);
+    fn expect_hold(&mut self, hold: Option<f64>);
+    fn step(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Status;
+    fn digest(&self) -> u64;
+}
+
+impl Way for Apart<'_> {
+    fn rearm(&mut self) {
+        self.rows.rearm();
+        self.follower.iter_mut().for_each(Follower::rearm);
+    }
+
+    fn expect_hold(&mut self, hold: Option<f64>) {
+        self.rows.expect_hold(hold).expect("a time");
+    }
+
+    fn step(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Status {
+        let status = self.rows.step(t, x, u_ref, u).expect("the lengths").status;
+        let Some(follower) = &mut self.follower else { return status };
+        if follower.step(t, x, u_ref, u).expect("the lengths") != Following::Kept {
+            return status;
+        }
+        self.rows.replace_input(u);
+        if u == u_ref { Status::Unchanged } else { Status::Filtered }
+    }
+
+    fn digest(&self) -> u64 {
+        let following = self.follower.as_ref().map_or(Following::NotBegun, |f| f.state().following);
+        let until = self.follower.as_ref().and_then(Follower::until);
+        digest(self.rows.report(), following, until.unwrap_or(0.0), |i| until.is_some() && self.promised[i])
+    }
+}
+
+impl Way for Loaded<'_> {
+    fn rearm(&mut self) {
+        self.rearm();
+    }
+
+    fn expect_hold(&mut self, hold: Option<f64>) {
+        self.filter.expect_hold(hold).expect("a time");
+    }
+
+    fn step(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Status {
+        self.step(t, x, u_ref, u).expect("the lengths").status
+    }
+
+    fn digest(&self) -> u64 {
+        let following = self.follower.as_ref().map_or(Following::NotBegun, |f| f.state().following);
+        digest(self.filter.report(), following, self.until().unwrap_or(0.0), |i| self.is_guaranteed(i))
+    }
+}
+
+/// Runs two filters side by side through `samples` steps, starting again now and then; `judge` sees each step, with the statuses
+/// and digests.
 fn run(
     case: &Case,
-    pair: [&mut Filter; 2],
+    pair: [&mut dyn Way; 2],
     samples: usize,
-    mut judge: impl FnMut(&[f64], [&[f64]; 2], [&Report; 2]),
+    mut judge: impl FnMut(&[f64], [&[f64]; 2], [(Status, u64); 2]),
 ) {
     let configuration = filter(&case.text);
     let plant = configuration.plant.build().expect("a plant");
@@ -142,7 +217,9 @@ fn run(
         let again = step.is_multiple_of(20_000);
         if again {
             t = draw.uniform(0.0, 3.0);
-            x.iter_mut().enumerate().for_each(|(i, x)| *x = draw.uniform(-0.5, 0.5) + f64::from(i == 3));
+            x.iter_mut()
+                .enumerate()
+                .for_each(|(i, x)| *x = draw.uniform(-case.spread, case.spread) + f64::from(i == 3));
         }
         wanted(&mut draw, step, &mut u_ref);
         let hold = draw.uniform(case.steps[0], case.steps[1]);
@@ -152,19 +229,20 @@ fn run(
             seen[0] = f64::NAN;
         }
         let mut results = [vec![0.0; inputs], vec![0.0; inputs]];
-        for (filter, u) in [&mut *a, &mut *b].into_iter().zip(&mut results) {
+        let mut found = [(Status::default(), 0); 2];
+        for ((filter, u), found) in [&mut *a, &mut *b].into_iter().zip(&mut results).zip(&mut found) {
             if again {
                 filter.rearm();
             }
-            filter.expect_hold(case.told.then_some(hold)).expect("a time");
-            filter.step(t, &seen, &u_ref, u).expect("the lengths");
+            filter.expect_hold(case.told.then_some(hold));
+            *found = (filter.step(t, &seen, &u_ref, u), filter.digest());
         }
         let sample: Vec<f64> = [f64::from(again), t, if case.told { hold } else { 0.0 }]
             .into_iter()
             .chain(seen)
             .chain(u_ref.iter().copied())
             .collect();
-        judge(&sample, results.each_ref().map(Vec::as_slice), [a.report(), b.report()]);
+        judge(&sample, results.each_ref().map(Vec::as_slice), found);
         plant.rk4_step(&mut x, &results[0], hold).expect("the lengths");
         t += hold;
     }
@@ -180,8 +258,12 @@ fn a_file_has_the_bits_of_its_filter() {
     let mut seen = [0; Status::ALL.len()];
     for case in cases() {
         let configuration = filter(&case.text);
-        let bytes = configuration.embedded().expect("a file").to_bytes().expect("bytes");
-        let mut wanted = configuration.build().expect("a filter");
+        let (file, table) = configuration.embedded().expect(case.name);
+        let bytes = file.to_bytes().expect("bytes");
+        let follower =
+            table.as_ref().map(|table| Follower::new(PlanTable::read(&table.bytes).expect("a table")));
+        let promised = table.as_ref().map(|table| &table.promised[..]).unwrap_or_default();
+        let mut wanted = Apart { rows: configuration.build().expect("a filter"), follower, promised };
         let mut found = punctual_embedded::read(&bytes).expect("a filter");
         let (states, inputs) = (configuration.plant.states().len(), configuration.plant.inputs().len());
         let count = samples(2_000);
@@ -197,16 +279,12 @@ fn a_file_has_the_bits_of_its_filter() {
         run(&case, [&mut wanted, &mut found], count, |sample, [a, b], [wanted, found]| {
             let bits = |u: &[f64]| u.iter().map(|u| u.to_bits()).collect::<Vec<_>>();
             assert_eq!(bits(a), bits(b), "{}: {sample:?}", case.name);
-            assert_eq!(
-                (wanted.status, digest(wanted)),
-                (found.status, digest(found)),
-                "{}: {sample:?}",
-                case.name
-            );
-            seen[wanted.status as usize] += 1;
+            assert_eq!(wanted, found, "{}: {sample:?}", case.name);
+            let (status, digest) = wanted;
+            seen[status as usize] += 1;
             if let Some(record) = &mut record {
                 let numbers = sample.iter().chain(a).map(|number| number.to_bits());
-                for bits in numbers.chain([wanted.status as u64, digest(wanted)]) {
+                for bits in numbers.chain([status as u64, digest]) {
                     record.write_all(&bits.to_le_bytes()).expect("written");
                 }
             }
@@ -225,18 +303,17 @@ fn a_vehicle_with_a_name_is_the_same_up_to_round_off() {
     let mut draw = Draw::new(3);
     let keys = "sampling = \"step_size\"\nexperiment = { step_size = 0.02, stop_time = 20.0 }";
     let text = vehicle(NAMED, 4, keys, "deadline = 15.0", &mut draw);
-    let case = Case { name: "named", text, steps: [0.02; 2], told: false };
+    let case = Case { name: "named", text, steps: [0.02; 2], told: false, spread: 0.5 };
     let configuration = filter(&case.text);
-    let mut wanted = configuration.build().expect("a filter");
-    let mut found =
-        punctual_embedded::read(&configuration.embedded().expect("a file").to_bytes().expect("bytes"))
-            .expect("a filter");
+    let rows = configuration.build().expect("a filter");
+    let mut wanted = Apart { rows, follower: None, promised: &[] };
+    let bytes = configuration.embedded().expect("a file").0.to_bytes().expect("bytes");
+    let mut found = punctual_embedded::read(&bytes).expect("a filter");
     let (mut same, mut all) = (0, 0);
-    run(&case, [&mut wanted, &mut found], 3_000, |_, [a, b], [wanted, found]| {
+    run(&case, [&mut wanted, &mut found], 3_000, |_, [a, b], [(wanted, _), (found, _)]| {
         all += 1;
         // Where two answers are equally far, round-off decides: rare, and a turn to the other side.
-        same +=
-            u32::from(wanted.status == found.status && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6));
+        same += u32::from(wanted == found && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6));
     });
     assert!(same * 100 >= all * 99, "{same} of {all}");
 }
@@ -246,7 +323,7 @@ fn what_the_library_has_not_is_refused_in_words() {
     let mut draw = Draw::new(1);
     let vehicle = |keys: &str, draw: &mut Draw| vehicle(NAMED, 1, keys, "deadline = 15.0", draw);
     for (text, field, part) in [
-        (vehicle("", &mut draw).replace("assurance = \"off\"\n", ""), "assurance", "must be \"off\""),
+        (vehicle("", &mut draw).replace("assurance = \"off\"\n", ""), "assurance", "[follower]"),
         (vehicle("measurement_errors = { x_p = 0.1 }", &mut draw), "measurement_errors", "left out"),
         (
             vehicle("", &mut draw).replace("radius = 0.8", "radius = 0.8\ncentre_input = true"),

@@ -64,13 +64,13 @@ static uint64_t fold(uint64_t digest, double number) {
     return (((digest << 5) | (digest >> 59)) ^ bits) * 0x100000001b3;
 }
 
-static uint64_t digest(const punctual_filter *filter, size_t barriers) {
-    uint64_t digest = 0;
+static uint64_t digest(const punctual_filter *filter, size_t barriers, const punctual_report *report) {
+    uint64_t digest = fold(fold(0, (double)report->plan), report->guaranteed_until);
     for (size_t i = 0; i < barriers; i++) {
         punctual_barrier_report b;
         if (punctual_barrier(filter, i, &b) != PUNCTUAL_RESULT_OK) exit(3);
         double numbers[] = {b.h, b.time_left, b.slack, b.arrival_time, (double)b.phase, (double)b.unmet_steps,
-                            b.on_course, b.deadline_unreachable, b.deadlocked};
+                            b.on_course, b.deadline_unreachable, b.deadlocked, b.guaranteed};
         for (size_t k = 0; k < sizeof numbers / sizeof *numbers; k++) digest = fold(digest, numbers[k]);
     }
     return digest;
@@ -100,7 +100,8 @@ int main(int count, char **arguments) {
         for (int k = 0; k < 64; k++)
             if (memories[i][size + k] != PAINT) return 4;
     }
-    memset(file, 0, file_size);
+    /* Rows need the file no longer. */
+    if (!strstr(arguments[1], "planned")) memset(file, 0, file_size);
     size_t used = size;
     while (used && memories[0][used - 1] == PAINT) used--;
 
@@ -148,7 +149,7 @@ int main(int count, char **arguments) {
         if (deep > step_stack) step_stack = deep;
         must(result, "step");
         int same = !memcmp(u, expected, inputs * sizeof *u) && (uint64_t)report.status == wanted[0] &&
-                   digest(filter, barriers) == wanted[1];
+                   digest(filter, barriers, &report) == wanted[1];
         if (!same && !wrong++) printf("step %lu differs: status %d, u %.17g not %.17g\n", (unsigned long)step, (int)report.status, u[0], expected[0]);
     }
     /* Not %zu, which small C libraries do not know. */

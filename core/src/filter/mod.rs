@@ -27,7 +27,7 @@ pub use crate::plan::Motion;
 #[cfg(feature = "plan")]
 pub use backup::{
     Appraisal, Assurance, AssuranceStatus, Bears, Driver, PlanState, Planning, Plans, Reason, Remedy,
-    UncertaintyKind,
+    TabledPlan, UncertaintyKind,
 };
 pub use builder::FilterBuilder;
 pub use integrator::Integration;
@@ -438,6 +438,17 @@ impl Filter {
             state.clone_rows_from(next);
         }
         is_whole
+    }
+
+    /// Remembers `u` as the input of the last step in place of the one that it returned, for a filter without plans: something
+    /// else decided. Numbers above the inputs are ignored.
+    #[doc(hidden)]
+    pub fn replace_input(&mut self, u: &[f64]) {
+        let Rows { state, input_dim, .. } = &mut self.rows;
+        let sent = state.sent.last_mut().map(|sent| &mut sent.input);
+        for input in sent.into_iter().chain([&mut state.input]) {
+            input.iter_mut().zip(u).take(*input_dim).for_each(|(input, u)| *input = *u);
+        }
     }
 
     /// The report of the last [`Self::step`] or [`Self::peek`], on the input that it returned.

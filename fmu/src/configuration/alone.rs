@@ -6,7 +6,7 @@ use super::controller::ControllerKind;
 use super::plant::PlantKind;
 use super::{
     ConfigurationError, Controller, ControllerConfiguration, Deviation, DisturbanceSection,
-    FilterConfiguration, IntegrationSection, ModelName, PlantConfiguration, PlantSection,
+    FilterConfiguration, FollowerSection, IntegrationSection, ModelName, PlantConfiguration, PlantSection,
 };
 
 /// What a run of a filter's file alone has besides the filter.
@@ -22,6 +22,8 @@ pub struct RunSection {
     pub integration: IntegrationSection,
     /// Disturbances that the model does not know.
     pub disturbance: Option<DisturbanceSection>,
+    /// The plan that a file of the C library follows.
+    pub follower: Option<FollowerSection>,
 }
 
 impl FilterConfiguration {
@@ -32,7 +34,7 @@ impl FilterConfiguration {
     /// A start, controller or disturbance that does not fit the plant; a plant that cannot be simulated, such as one of which
     /// only the inputs are known.
     pub fn alone(&self) -> Result<(PlantConfiguration, Option<ControllerConfiguration>), ConfigurationError> {
-        let RunSection { x0, u_ref, simulated, integration, disturbance } = (*self.run).clone();
+        let RunSection { x0, u_ref, simulated, integration, disturbance, follower: _ } = (*self.run).clone();
         let is_model = simulated.is_none() && self.integrator.is_none();
         let plant = simulated.map_or_else(|| self.outside(), Ok)?;
         let controller = u_ref.map(|u_ref| {

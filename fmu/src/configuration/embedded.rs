@@ -1,20 +1,23 @@
 //! A filter as a file for the C library.
 
+use punctual_core::filter::TabledPlan;
 use punctual_embedded::{BarrierFile, FilterFile, Promise, Settings};
 
 use super::{BarrierSection, ConfigurationError, FilterConfiguration, VariableSection};
 
 /// What is not there, why, and what to do.
-const ROWS_ALONE: &str = "must be \"off\" for a file of the C library, which has the rows and no plans: what they promise holds \
-                          as long as each step is met, and the report tells";
+const NO_SEARCH: &str = "and a file of the C library searches for no plan: give the starts for which one is made in \
+                         `[follower]`, or take the rows alone with `assurance = \"off\"`, whose promises hold as long as each step is met";
 
 impl FilterConfiguration {
-    /// The filter as a file of the [C library](punctual_embedded): its plant and its barriers as expressions.
+    /// The filter as a file of the [C library](punctual_embedded): its plant and its barriers as expressions, and the plan of
+    /// `[follower]`, if it has one.
     ///
     /// # Errors
     ///
-    /// What the library has not: plans, an integrator, errors of measurement, plug-ins, barriers and centres that are inputs.
-    pub fn embedded(&self) -> Result<FilterFile, ConfigurationError> {
+    /// What the library has not: a search for plans, an integrator, plug-ins, barriers and centres that are inputs; without a plan,
+    /// uncertainty. Why no plan was found.
+    pub fn embedded(&self) -> Result<(FilterFile, Option<TabledPlan>), ConfigurationError> {
         let refuse = |field: &str, message: &str| Err(ConfigurationError::new(field, message));
         if self.plant.plugin().is_some() || self.plant.is_external() {
             return refuse(
@@ -22,21 +25,17 @@ impl FilterConfiguration {
                 "is no model of expressions, must be one, or a vehicle with a name, for a file of the C library",
             );
         }
-        if self.is_assured() {
-            return refuse("assurance", &format!("is on, {ROWS_ALONE}"));
+        if self.is_assured() && self.run.follower.is_none() {
+            return refuse("assurance", &format!("is on, {NO_SEARCH}"));
         }
-        for (field, is_given) in [
-            ("integrator", self.integrator.is_some()),
-            ("measurement_errors", self.measurement_errors.values().any(|error| *error != 0.0)),
-            ("uncertainty", self.uncertainty.is_some()),
-        ] {
-            if is_given {
-                return refuse(
-                    field,
-                    "must be left out for a file of the C library, which accounts for none",
-                );
-            }
+        if self.integrator.is_some() {
+            return refuse("integrator", "must be left out for a file of the C library, which has none");
         }
+        if self.run.follower.is_none() && self.measurement_errors.values().any(|error| *error != 0.0) {
+            let message = "must be left out for a file of the C library without a plan (`[follower]`): its rows account for none";
+            return refuse("measurement_errors", message);
+        }
+        let table = self.tabled()?;
         let model = self.plant.expressions()?;
         let (mut plant, mut barriers) = (None, Vec::new());
         for (i, section) in self.barrier.iter().enumerate() {
@@ -62,6 +61,7 @@ impl FilterConfiguration {
                 begin,
                 end,
                 strictness: self.strictness(i)?,
+                is_planned: table.as_ref().is_some_and(|table| table.promised[i]),
             });
         }
         let Some(plant) = plant else { return refuse("barrier", "is empty, must have at least 1") };
@@ -73,7 +73,8 @@ impl FilterConfiguration {
             period_max: self.period_max,
             arm_after: self.arm_after,
         };
-        Ok(FilterFile { settings, plant, barriers })
+        let plan = table.as_ref().map(|table| table.bytes.clone()).unwrap_or_default();
+        Ok((FilterFile { settings, plant, barriers, plan }, table))
     }
 
     /// h of a barrier as an expression of the plant's states.

@@ -23,8 +23,9 @@ use super::team::{self, RawAgent};
 use super::words::words;
 use super::{
     BarrierInput, BarrierSection, ConfigurationError, DisturbanceSection, EXPERIMENT, ExperimentSection,
-    IntegrationSection, IntegratorSection, Parameter, PlantSection, PluginLoader, Range, RunSection,
-    UncertaintySection, VariableSection, barrier, integrator, model, plant, uncertainty,
+    FollowerSection, IntegrationSection, IntegratorSection, Parameter, PlantSection, PluginLoader, Range,
+    RunSection, UncertaintySection, VariableSection, barrier, follower, integrator, model, plant,
+    uncertainty,
 };
 use crate::text::{number, quantity, shown_unit};
 
@@ -94,6 +95,7 @@ pub(super) struct RawFilter {
     #[serde(default)]
     integration: IntegrationSection,
     pub(super) disturbance: Option<DisturbanceSection>,
+    pub(super) follower: Option<FollowerSection>,
 }
 
 /// A filter FMU. docs/configuration.md has units, ranges and defaults.
@@ -184,7 +186,7 @@ fn correction_limit() -> f64 {
 pub(super) static SECTION: Section = Section {
     name: "filter",
     keys: || {
-        static KEYS: [Key; 27] = [
+        static KEYS: [Key; 28] = [
             Key::new("kind", Word(&["filter"]), None, ""),
             Key::new("name", Name, Some("`filter`"), "the FMU's name"),
             Key::new("plant", Table(&model::PLANT), None, "[the model](#models) that the filter is for"),
@@ -346,6 +348,12 @@ pub(super) static SECTION: Section = Section {
                 Some("none"),
                 "a run of this file: as of a plant",
             ),
+            Key::new(
+                "follower",
+                Table(&follower::SECTION),
+                Some("none"),
+                "[the plan of a file for the C library](#follower); nothing else reads it",
+            ),
         ];
         KEYS.iter().collect()
     },
@@ -430,6 +438,7 @@ impl FilterConfiguration {
                     .map_err(|e| within("simulated", &e))?,
                 integration: raw.integration,
                 disturbance: raw.disturbance,
+                follower: raw.follower,
             }),
         };
         configuration.check_sampling()?;
@@ -438,6 +447,9 @@ impl FilterConfiguration {
         check_known("measurement_errors", &configuration.measurement_errors, "measured state", &states)?;
         if let Some(uncertainty) = &configuration.uncertainty {
             uncertainty.check(&configuration.plant)?;
+        }
+        if let Some(follower) = &configuration.run.follower {
+            follower.check(&configuration.plant)?;
         }
         // Check every number by itself.
         configuration.experiment.check()?;

@@ -16,6 +16,7 @@ mod embedded;
 mod external;
 mod file_kind;
 mod filter;
+mod follower;
 mod found;
 mod integrator;
 mod key;
@@ -42,6 +43,7 @@ pub use deviation::{Deviation, DeviationKind};
 pub use external::BarrierInput;
 pub use file_kind::FileKind;
 pub use filter::{FilterConfiguration, SamplingName};
+pub use follower::FollowerSection;
 pub use integrator::IntegratorSection;
 pub use key::{Key, Section, Unit, Value};
 pub use mission::{Literal, Mission, Task};
@@ -196,7 +198,7 @@ impl Configuration {
 }
 
 /// The files and their tables, each after the tables that contain it.
-pub static SECTIONS: [&Section; 15] = [
+pub static SECTIONS: [&Section; 16] = [
     &filter::SECTION,
     &team::SECTION,
     &barrier::SECTION,
@@ -206,6 +208,7 @@ pub static SECTIONS: [&Section; 15] = [
     &integrator::SECTION,
     &uncertainty::SECTION,
     &uncertainty::INPUT,
+    &follower::SECTION,
     &plant::SECTION,
     &plant::OUTPUT,
     &plant::INTEGRATION,

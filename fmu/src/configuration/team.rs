@@ -104,6 +104,12 @@ impl RawFilter {
             team.spread(&mut uncertainty.rates, |_, rate| *rate);
             team.spread(&mut uncertainty.inputs, |_, input| *input);
         }
+        if let Some(follower) = &mut self.follower {
+            team.spread(&mut follower.start, |_, size| *size);
+            if let Some(freedom) = &mut follower.freedom {
+                team.spread(freedom, |_, size| *size);
+            }
+        }
         if let Some(policy) = &mut self.policy {
             team.spread(policy, |agent, text| team.renamed(agent, text));
         }

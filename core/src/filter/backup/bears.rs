@@ -1,6 +1,5 @@
 //! What a plan from a first sample bears of a plant that is not the model.
 
-use alloc::vec;
 use alloc::vec::Vec;
 
 use super::Planning;
@@ -105,13 +104,7 @@ impl Planning<'_> {
         let (measured, courses) = (self.state(x), self.courses(t, x));
         let (acts, x) = self.acts(t, &measured);
         let [states, inputs] = [self.states, self.rows.input_dim];
-        let none = Uncertainty {
-            rates: vec![0.0; states],
-            errors: vec![0.0; states],
-            gains: vec![[1.0; 2]; inputs],
-            lags: vec![[0.0; 2]; inputs],
-            jitter: 0.0,
-        };
+        let none = Uncertainty::nothing([states, inputs]);
         let measured_at = Some((t, &measured[..]));
         let own = Planning { measured: measured_at, courses: &courses, uncertainty: Some(&none), ..*self };
         let (promises, at) = (&first.promises, (acts, self.plans.period));

@@ -24,6 +24,7 @@ mod schedule;
 mod settings;
 mod state;
 mod status;
+mod table;
 
 use alloc::boxed::Box;
 use alloc::format;
@@ -36,7 +37,7 @@ use super::{Begin, End, Filter, FilterState, MOST_LATE, NoDerivative, SampleDeri
 use crate::MAX_INPUTS;
 use crate::error::{Error, ErrorKind, length, non_negative, positive};
 use crate::interval::Interval;
-use crate::lie::{Direction, Second, SharedPlant};
+use crate::lie::{Direction, Predict, Second, SharedPlant};
 use crate::plan::{BackupPlan, Motion, Policy, Uncertainty};
 use crate::qp::Bounds;
 pub use bears::{Bears, Remedy, UncertaintyKind};
@@ -48,6 +49,7 @@ use sample::{At, Decision};
 use settings::DECISIONS;
 pub use state::PlanState;
 pub use status::{Assurance, AssuranceStatus, Driver, Reason};
+pub use table::TabledPlan;
 
 /// How a filter makes plans ([`Filter::with_plans`]). A plain number is a period, with plans that end at an equilibrium.
 pub struct Plans {
@@ -488,6 +490,7 @@ impl Filter {
             gains: gains.chain(core::iter::repeat([1.0; 2])).take(*input_dim).collect(),
             lags: plans.lags.iter().copied().chain(core::iter::repeat([0.0; 2])).take(*input_dim).collect(),
             jitter: plans.jitter,
+            ..Uncertainty::nothing([*state_dim, *input_dim])
         };
         if uncertainty.is_nothing() {
             return Ok(None);
@@ -736,9 +739,14 @@ fn trial_state(i: usize, trial: usize) -> f64 {
     ((i * 37 + trial * 101 + 13) % 89) as f64 / 31.0 - 1.2
 }
 
-/// Whether h changes with time alone, at some states, and no bounds on that change are known. h is evaluated at a few times
-/// in s, and over all times at once if it has enclosures.
+/// Whether h changes with time alone, at some states, and no bounds on that change are known.
 fn leaves(slot: &BarrierSlot, states: usize) -> bool {
+    moves(slot, states, |model, x| model.lowest_from(0.0, x).is_none_or(|least| least == f64::NEG_INFINITY))
+}
+
+/// Whether h changes with time alone, at some states that are `meant`. It is evaluated at a few times in s, and over all times at once
+/// if it has enclosures.
+fn moves(slot: &BarrierSlot, states: usize, meant: impl Fn(&dyn Predict, &[f64]) -> bool) -> bool {
     let Some(model) = slot.source.predict() else { return false };
     (0..DECISIONS.trials).any(|trial| {
         let x: Vec<f64> = (0..states).map(|i| trial_state(i, trial)).collect();
@@ -746,7 +754,7 @@ fn leaves(slot: &BarrierSlot, states: usize) -> bool {
         let moves =
             values.iter().any(|h| (h - values[0]).abs() > DECISIONS.unmoved * (1.0 + values[0].abs()))
                 || model.is_still(&x) == Some(false);
-        moves && model.lowest_from(0.0, &x).is_none_or(|least| least == f64::NEG_INFINITY)
+        moves && meant(model, &x)
     })
 }
 

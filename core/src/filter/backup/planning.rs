@@ -369,11 +369,12 @@ impl<'a> Planning<'a> {
 
     /// By how much h may be lower than at the measured state `x`.
     fn unseen(&self, model: &dyn Predict, t: f64, x: &[f64]) -> f64 {
-        let Some(Uncertainty { errors, .. }) = self.uncertainty else { return 0.0 };
+        let Some(Uncertainty { errors, start, .. }) = self.uncertainty else { return 0.0 };
         let mut gradient = x.to_vec();
         slopes(model, t, x, &mut gradient);
         // Twice, since h may be curved.
-        gradient.iter().zip(errors).map(|(slope, error)| 2.0 * slope.abs() * error).sum()
+        let unseen = errors.iter().zip(start).map(|(error, start)| error + start);
+        gradient.iter().zip(unseen).map(|(slope, unseen)| 2.0 * slope.abs() * unseen).sum()
     }
 
     /// `promises` with each deadline at `part` of its time from the sample whose input acts from `t` on, but not before it

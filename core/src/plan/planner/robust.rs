@@ -304,7 +304,10 @@ impl<'a> Planner<'a> {
             None => gains(self.plant, (&times, &states, &inputs), &self.reaches(uncertain)),
         };
         let law = |mut gains: Vec<Vec<f64>>| {
-            gains[0].clear();
+            // One state is known where it begins, each of a set is measured there.
+            if uncertain.of.start.iter().all(|start| *start == 0.0) {
+                gains[0].clear();
+            }
             Tracking { times: times.clone(), inputs: inputs.clone(), gains, ..Tracking::default() }
         };
         gains.into_iter().map(law).collect()

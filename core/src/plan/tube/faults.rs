@@ -13,6 +13,8 @@ pub(in crate::plan) enum Fault {
     Gain,
     /// The law's answer to errors of measurement is ignored.
     Noise,
+    /// The freedom of the inputs is ignored.
+    Freedom,
     /// What the first derivatives leave out is ignored.
     Remainder,
 }

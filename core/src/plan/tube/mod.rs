@@ -96,12 +96,30 @@ pub(crate) struct Uncertainty {
     /// By how much of a period a sample may come after it was expected. If 0, samples come as expected; otherwise also at any
     /// time before.
     pub(crate) jitter: f64,
+    /// How far each state may be from where the plan begins, beside its error of measurement, and by how much each input may
+    /// differ from that of the law, at all times.
+    pub(crate) start: Vec<f64>,
+    pub(crate) freedom: Vec<f64>,
 }
 
 impl Uncertainty {
-    /// Whether the plant is the model and measured exactly.
+    /// Nothing, for a plant with so many states and inputs.
+    pub(crate) fn nothing([states, inputs]: [usize; 2]) -> Self {
+        Self {
+            rates: vec![0.0; states],
+            errors: vec![0.0; states],
+            gains: vec![[1.0; 2]; inputs],
+            lags: vec![[0.0; 2]; inputs],
+            jitter: 0.0,
+            start: vec![0.0; states],
+            freedom: vec![0.0; inputs],
+        }
+    }
+
+    /// Whether the plant is the model and measured exactly, and a plan is for one state.
     pub(crate) fn is_nothing(&self) -> bool {
-        self.rates.iter().chain(&self.errors).all(|size| *size == 0.0)
+        let sizes = self.rates.iter().chain(&self.errors).chain(&self.start).chain(&self.freedom);
+        sizes.into_iter().all(|size| *size == 0.0)
             && self.gains.iter().all(|gain| *gain == [1.0; 2])
             && !self.lags()
             && self.jitter == 0.0
@@ -283,8 +301,8 @@ impl<'a> Tube<'a> {
             rooms: Rooms::default(),
         };
         tube.next_unseen = tube.errors();
-        for (i, error) in tube.next_unseen.iter().enumerate() {
-            tube.set.push_along(i, *error);
+        for (i, (error, start)) in tube.next_unseen.iter().zip(&of.start).enumerate() {
+            tube.set.push_along(i, error + start);
         }
         tube.set.reach(&mut tube.reach);
         Some(tube)
@@ -497,7 +515,8 @@ impl<'a> Tube<'a> {
                 half = 0.0;
             }
             let (mean, around) = middle(of.remains_on_average(i, dt, held));
-            let (late, apart) = (lates[i], noise[i] + differs);
+            let free = if is_planted(Fault::Freedom) { 0.0 } else { of.freedom[i] };
+            let (late, apart) = (lates[i], noise[i] + differs + free);
             let (asked, fixed) = (reach[kept + i] + apart, (part - 1.0) * u[i]);
             let gained = half * (u[i].abs() + asked + late);
             // What follows late changes before it is asked anew, and so does what is left of earlier holds.

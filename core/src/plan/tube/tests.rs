@@ -160,6 +160,7 @@ where
         gains: vec![[0.9, 1.05], [0.95, 1.1]],
         lags: if jitter > 0.0 { vec![[0.0; 2]; 2] } else { vec![[0.01, 0.06], [0.0, 0.04]] },
         jitter,
+        ..Uncertainty::nothing([4, 2])
     };
     let bounds = Bounds { min: [-9.0; MAX_INPUTS], max: [9.0; MAX_INPUTS] };
     let requirement = Requirement {
@@ -285,13 +286,7 @@ fn no_disturbance_of_a_linear_cart_leads_out_of_its_tube() {
         (0.1, 0.03, [1.0, 2.0]),
         (0.05, 0.05, [4.0, 4.0]),
     ] {
-        let of = Uncertainty {
-            rates: vec![0.0, 0.01],
-            errors: vec![0.0; 2],
-            gains: vec![[1.0; 2]],
-            lags: vec![[lag; 2]],
-            jitter: 0.0,
-        };
+        let of = Uncertainty { rates: vec![0.0, 0.01], lags: vec![[lag; 2]], ..Uncertainty::nothing([2, 1]) };
         let bounds = Bounds { min: [-1e9; MAX_INPUTS], max: [1e9; MAX_INPUTS] };
         let tube = Tube::around(model, (&of, [0.0, dt]), &bounds, [2, 1], &[]).expect("derivatives");
         let (mut tube, gain) = (tube.acted_on(&[[0.0; 2]]), [-k0, -k1]);

@@ -231,7 +231,7 @@ where
         errors: declared.errors.to_vec(),
         gains: declared.gains.to_vec(),
         lags: declared.lags.to_vec(),
-        jitter: 0.0,
+        ..Uncertainty::nothing([4, 2])
     };
     let tube = Tube::around(model, (&of, [0.0, PERIOD]), &bounds, [4, 2], &[]).expect("derivatives");
     let plant = Model {
@@ -400,13 +400,7 @@ fn of_a_point_mass(holds: usize, h: f64, fault: Option<Fault>) -> ([f64; 8], [f6
     let models: Vec<&dyn Predict> = limits.iter().map(|limit| limit.predict().expect("a model")).collect();
     let requirements: Vec<Requirement<'_>> = models.iter().map(|model| always(*model)).collect();
     let (of, bounds) = (
-        Uncertainty {
-            rates: RATES.to_vec(),
-            errors: ERRORS.to_vec(),
-            gains: vec![[1.0; 2]; 2],
-            lags: vec![[0.0; 2]; 2],
-            jitter: 0.0,
-        },
+        Uncertainty { rates: RATES.to_vec(), errors: ERRORS.to_vec(), ..Uncertainty::nothing([4, 2]) },
         Bounds { min: [-9.0; MAX_INPUTS], max: [9.0; MAX_INPUTS] },
     );
     let [[kp, kv], [lp, lv]] = GAINS;
@@ -524,8 +518,7 @@ where
 
 /// Nothing is uncertain of a plant with four states and two inputs.
 fn exact() -> Uncertainty {
-    let (rates, errors) = (vec![0.0; 4], vec![0.0; 4]);
-    Uncertainty { rates, errors, gains: vec![[1.0; 2]; 2], lags: vec![[0.0; 2]; 2], jitter: 0.0 }
+    Uncertainty::nothing([4, 2])
 }
 
 /// Part of a known deviation that counts as round-off.
@@ -576,8 +569,7 @@ fn a_check_at_samples_alone_is_found() {
             rates: vec![0.0, 0.0, 0.1, 0.1],
             errors: vec![0.02; 4],
             gains: vec![[0.95, 1.05]; 2],
-            lags: vec![[0.0; 2]; 2],
-            jitter: 0.0,
+            ..Uncertainty::nothing([4, 2])
         },
         Bounds { min: [-9.0; MAX_INPUTS], max: [9.0; MAX_INPUTS] },
     );

@@ -1,0 +1,144 @@
+//! Tables of plans: whatever u_ref asks for, every declared plant from every declared start keeps what was promised.
+//!
+//! The judge has an integrator of its own, and looks between samples too. More cases:
+//! `PUNCTUAL_FOLLOWER=100 cargo test --release -p punctual-core --test all -- --nocapture follower::`.
+
+#![allow(clippy::print_stdout, reason = "the figures are wanted")]
+
+use crate::uncertain::*;
+
+use punctual_core::dynamics::ControlAffine;
+use punctual_core::filter::TabledPlan;
+use punctual_core::follower::{Follower, Following, PlanTable};
+use punctual_core::plants::{Bicycle, PointMass, Unicycle};
+
+const START: [f64; 4] = [0.1, 0.1, 0.03, 0.05];
+/// Steps of the follower in a period of its plan.
+const STEPS: u32 = 4;
+
+/// What runs came to.
+#[derive(Debug)]
+struct Tally {
+    accepted: usize,
+    runs: usize,
+    least: f64,
+    /// Of all inputs those that passed, and the parts of half the widths of the bounds that are free.
+    passed: f64,
+    freedom: f64,
+}
+
+fn table<P>(plant: &P, case: &Case, declared: &Declared) -> Option<TabledPlan>
+where
+    P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
+{
+    let filter = case.filter(plant.clone(), Some(declared));
+    let planning = filter.planning().unwrap();
+    match planning.table(0.0, &case.x, &START, None).unwrap() {
+        Ok(table) => Some(table),
+        Err(failure) => {
+            println!("{failure}");
+            None
+        }
+    }
+}
+
+/// Runs a plant from a corner of the start set. Returns the least h, and the part of inputs that passed.
+fn attacked<P>(plant: &P, case: &Case, declared: &Declared, table: &PlanTable<'_>, seed: u64) -> [f64; 2]
+where
+    P: ControlAffine<4, 2>,
+{
+    let mut draws = Draws(seed);
+    let mut follower = Follower::new(*table);
+    let mut x: [f64; 4] = core::array::from_fn(|i| case.x[i] + START[i] * draws.sign());
+    let (adversary, asks) = (ADVERSARIES[seed as usize % 3], ASKS[seed as usize / 3 % 3]);
+    let mut sides = Sides::of(|| draws.sign());
+    let (mut wanted, mut least, mut passed) = ([0.0; 2], f64::INFINITY, 0);
+    let dt = PERIOD / f64::from(STEPS);
+    let steps = (table.until() / dt - 0.5) as u32;
+    for step in 0..steps {
+        let t = 7.0 + f64::from(step) * dt;
+        match adversary {
+            Adversary::Random => sides = Sides::of(|| draws.within(-1.0, 1.0)),
+            Adversary::Corners if draws.part() < 0.02 => sides = Sides::of(|| draws.sign()),
+            _ => {}
+        }
+        let measured: [f64; 4] = core::array::from_fn(|i| x[i] + declared.errors[i] * sides.errors[i]);
+        wanted = match asks {
+            Asks::Zero => [0.0; 2],
+            Asks::Damping => [-measured[2], -measured[3]],
+            // For a while each.
+            Asks::Hostile if draws.part() < 0.02 => case.bounds.map(|bound| bound * draws.sign()),
+            Asks::Hostile => wanted,
+        };
+        let mut u = [0.0; 2];
+        let following = follower.step(t, &measured, &wanted, &mut u).unwrap();
+        assert_eq!(following, Following::Kept, "{case:?} {seed} at {t}");
+        assert!(u.iter().zip(case.bounds).all(|(u, bound)| u.abs() <= bound), "{u:?}");
+        passed += usize::from(u == wanted);
+        let rate = |x: &[f64; 4]| {
+            let arrives = core::array::from_fn(|i| {
+                let [low, high] = declared.gains[i];
+                u[i] * (0.5 * (low + high) + 0.5 * (high - low) * sides.gains[i])
+            });
+            let rate = plant.derivative(x, &arrives);
+            core::array::from_fn::<f64, 4, _>(|i| rate[i] + declared.rates[i] * sides.rates[i])
+        };
+        // The classical rule of fourth order, in two parts of a step.
+        for part in 1..=2 {
+            let h = 0.5 * dt;
+            let moved = |by: f64, k: &[f64; 4]| core::array::from_fn::<f64, 4, _>(|i| x[i] + by * h * k[i]);
+            let k1 = rate(&x);
+            let k2 = rate(&moved(0.5, &k1));
+            let k3 = rate(&moved(0.5, &k2));
+            let k4 = rate(&moved(1.0, &k3));
+            x = core::array::from_fn(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]));
+            let now = t - 7.0 + 0.5 * f64::from(part) * dt;
+            for (j, h) in case.h(&x).into_iter().enumerate() {
+                if j > 0 || now >= DEADLINE {
+                    least = least.min(h);
+                }
+            }
+        }
+    }
+    [least, passed as f64 / f64::from(steps)]
+}
+
+fn tally<P>(name: &str, plant: &P, bounds: [f64; 2], declared: &Declared, seed: u64) -> Tally
+where
+    P: ControlAffine<4, 2> + Clone + Send + Sync + 'static,
+{
+    let cases = std::env::var("PUNCTUAL_FOLLOWER").map_or(1, |cases| cases.parse().unwrap());
+    let mut draws = Draws(seed);
+    let mut tally = Tally { accepted: 0, runs: 0, least: f64::INFINITY, passed: 0.0, freedom: 0.0 };
+    for k in 0..cases {
+        let case = Case::draw(&mut draws, bounds, name == "point mass");
+        let Some(made) = table(plant, &case, declared) else { continue };
+        assert!(made.promised.iter().all(|promised| *promised));
+        tally.accepted += 1;
+        let table = PlanTable::read(&made.bytes).unwrap();
+        tally.freedom += made.freedom[0] / bounds[0];
+        for run in 0..30 {
+            let [least, passed] = attacked(plant, &case, declared, &table, 31 * k + run);
+            tally.runs += 1;
+            tally.least = tally.least.min(least);
+            tally.passed += passed;
+        }
+    }
+    tally.passed /= tally.runs as f64;
+    tally.freedom /= tally.accepted as f64;
+    println!("{name}: {tally:?} of {cases}");
+    tally
+}
+
+#[test]
+fn every_start_and_every_wish_is_kept() {
+    for (declared, seed) in [(Declared::nothing(), 1), (Declared::all(false), 2)] {
+        let found = [
+            tally("unicycle", &Unicycle, [4.0, 1.5], &declared, seed),
+            tally("point mass", &PointMass, [4.0; 2], &declared, seed),
+            tally("bicycle", &Bicycle::new(2.5).unwrap(), [4.0, 0.6], &declared, seed),
+        ];
+        assert!(found.iter().all(|tally| tally.runs == 0 || tally.least >= 0.0), "{found:?}");
+        assert!(found.iter().map(|tally| tally.accepted).sum::<usize>() >= 2, "{found:?}");
+    }
+}
