@@ -11,6 +11,7 @@ mod support;
 mod uncertain;
 
 mod arming;
+mod brief;
 mod chains;
 mod convergence_lemma;
 mod convergence_profile;

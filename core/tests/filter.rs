@@ -417,3 +417,29 @@ fn derivatives_that_are_not_finite_are_singular() {
     assert_eq!((u, status), ([0.0, 0.0], Status::Singular));
     assert_eq!(filter.state().barriers[0].phase, Phase::Waiting);
 }
+
+/// What is observed of the input that a step returned is what the step reports; of another one, what its rows say.
+#[test]
+fn a_sample_is_observed() {
+    let filter = || pointwise(Unicycle, distance_disc(), BarrierSettings::within(12.0));
+    let [mut stepped, mut observed] = [filter(), filter()];
+    let mut x = [0.0, 0.0, 0.3, 1.0];
+    for k in 0..1500 {
+        let t = 0.01 * f64::from(k);
+        let mut u = [0.0; 2];
+        let report = stepped.step(t, &x, &[0.0; 2], &mut u).expect("the lengths").clone();
+        let seen = observed.observe(t, &x, &u).expect("the lengths").clone();
+        assert_eq!(report.barriers, seen.barriers, "at {t}");
+        assert_eq!(
+            (stepped.state().input, &stepped.state().barriers),
+            (observed.state().input, &observed.state().barriers)
+        );
+        x = punctual_core::dynamics::rk4_step(&Unicycle, &x, &u, 0.01);
+    }
+    assert_eq!(observed.state().barriers[0].phase, Phase::Stay);
+    let mut waiting = filter();
+    let away = waiting.observe(0.0, &[0.0, 0.0, 3.1, 2.0], &[3.0, 0.0]).expect("the lengths").clone();
+    assert_eq!((away.status, away.barriers[0].on_course), (Status::Infeasible, false));
+    let invalid = waiting.observe(0.01, &[f64::NAN; 4], &[1.0, 2.0]).expect("the lengths").status;
+    assert_eq!((invalid, waiting.state().input[..2].to_vec()), (Status::InvalidInput, vec![1.0, 2.0]));
+}

@@ -9,7 +9,7 @@ use crate::uncertain::*;
 
 use punctual_core::dynamics::ControlAffine;
 use punctual_core::filter::TabledPlan;
-use punctual_core::follower::{Follower, Following, PlanTable};
+use punctual_core::follower::{Follower, FollowerState, Following, PlanTable};
 use punctual_core::plants::{Bicycle, PointMass, Unicycle};
 
 const START: [f64; 4] = [0.1, 0.1, 0.03, 0.05];
@@ -141,4 +141,119 @@ fn every_start_and_every_wish_is_kept() {
         assert!(found.iter().all(|tally| tally.runs == 0 || tally.least >= 0.0), "{found:?}");
         assert!(found.iter().map(|tally| tally.accepted).sum::<usize>() >= 2, "{found:?}");
     }
+}
+
+/// A case, its plan, and how many bytes a number takes.
+fn planned() -> (Case, TabledPlan) {
+    let case = Case {
+        x: [0.0, 0.0, 0.0, 1.0],
+        goal: [12.0, 2.0],
+        rocks: Vec::new(),
+        bounds: [4.0, 1.5],
+        is_point: false,
+    };
+    let made = table(&Unicycle, &case, &Declared::all(false)).expect("a plan");
+    (case, made)
+}
+
+#[test]
+fn what_is_no_plan_is_refused() {
+    let (_, TabledPlan { bytes, .. }) = planned();
+    let is_table = |bytes: &[u8]| PlanTable::read(bytes).is_ok();
+    assert!(is_table(&bytes));
+    assert!((0..bytes.len()).all(|length| !is_table(&bytes[..length])));
+    // One number at a time is none.
+    let count = bytes.len() / 8;
+    for k in (0..count).filter(|k| ![5, 8, 9, 10, 11].contains(k)) {
+        let mut damaged = bytes.clone();
+        damaged[8 * k..8 * (k + 1)].copy_from_slice(&f64::NAN.to_le_bytes());
+        assert!(!is_table(&damaged), "number {k}");
+    }
+    // Numbers that are too large to be counts, or no whole ones.
+    for number in [0.5, -1.0, 1e300, f64::INFINITY] {
+        for k in 0..3 {
+            let mut damaged = bytes.clone();
+            damaged[8 * k..8 * (k + 1)].copy_from_slice(&number.to_le_bytes());
+            assert!(!is_table(&damaged), "{number} at {k}");
+        }
+    }
+}
+
+#[test]
+fn a_guarantee_is_lost_where_it_has_to_be() {
+    let (case, made) = planned();
+    let table = PlanTable::read(&made.bytes).expect("a table");
+    let mut u = [0.0; 2];
+    let reference = |k: usize| -> [f64; 4] { core::array::from_fn(|i| table.state(k, i)) };
+    let mut step = |follower: &mut Follower<'_>, t: f64, x: &[f64; 4]| {
+        follower.step(t, x, &[f64::NAN, 100.0], &mut u).expect("the lengths")
+    };
+    // A start at the edge, and one beyond it.
+    for (by, wanted) in [(0.999, Following::Kept), (1.001, Following::OutOfStart)] {
+        let mut follower = Follower::new(table);
+        let mut x = case.x;
+        x[1] += by * table.radius(0, 1);
+        assert_eq!(step(&mut follower, 3.0, &x), wanted);
+        assert_eq!(follower.until().is_some(), wanted == Following::Kept);
+    }
+    // Along the reference, to the end; u_ref that is no number is the law, and one that is too large is limited.
+    let mut follower = Follower::new(table);
+    for k in 0..table.holds() {
+        let t = 3.0 + table.begin(k);
+        let is_over = table.begin(k) >= table.until() - 1e-6;
+        let wanted = if is_over { Following::Ended } else { Following::Kept };
+        assert_eq!(step(&mut follower, t, &reference(k)), wanted, "{k}");
+        if !is_over {
+            let law = follower.state().law[1];
+            let mut found = [0.0; 2];
+            // The same step again changes nothing.
+            follower.step(t, &[f64::NAN; 4], &[f64::NAN, 100.0], &mut found).expect("the lengths");
+            assert_eq!(found[0], follower.state().law[0]);
+            assert_eq!(found[1], (law + table.freedom(1)).min(case.bounds[1]));
+        }
+    }
+    assert_eq!(step(&mut follower, 3.0 + table.until(), &reference(0)), Following::Ended);
+    // A step that misses the beginning of a hold; what is lost stays lost until it is armed again.
+    let mut follower = Follower::new(table);
+    assert_eq!(step(&mut follower, 0.0, &reference(0)), Following::Kept);
+    assert_eq!(step(&mut follower, table.begin(1) + 0.003, &reference(1)), Following::Late);
+    assert_eq!(step(&mut follower, table.begin(2), &reference(2)), Following::Late);
+    follower.rearm();
+    assert_eq!(step(&mut follower, 9.0, &reference(0)), Following::Kept);
+    // A plant that is where it cannot be, and one that cannot be measured.
+    let saved = *follower.state();
+    for (i, off) in [(0, 1.0), (3, f64::NAN)] {
+        let mut x = reference(1);
+        x[i] += off;
+        assert_eq!(step(&mut follower, 9.0 + table.begin(1), &x), Following::OutOfTube);
+        assert!(follower.restore(saved));
+    }
+    assert_eq!(step(&mut follower, 9.0 + table.begin(1), &reference(1)), Following::Kept);
+    let flawed = FollowerState { hold: 100_000, ..saved };
+    assert!(!follower.restore(flawed));
+}
+
+#[test]
+fn what_a_table_has_not_is_refused() {
+    let case = Case {
+        x: [0.0, 0.0, 0.0, 1.0],
+        goal: [12.0, 2.0],
+        rocks: Vec::new(),
+        bounds: [4.0, 1.5],
+        is_point: false,
+    };
+    for (declared, field) in [
+        (Declared { delay: PERIOD, ..Declared::nothing() }, "actuation_delay"),
+        (Declared { jitter: 0.5, ..Declared::nothing() }, "jitter"),
+    ] {
+        let filter = case.filter(Unicycle, Some(&declared));
+        let error = filter.planning().unwrap().table(0.0, &case.x, &START, None).unwrap_err();
+        assert_eq!(error.field(), field);
+    }
+    let filter = case.filter(Unicycle, None);
+    let error = filter.planning().unwrap().table(0.0, &case.x, &[-1.0, 0.0, 0.0, 0.0], None).unwrap_err();
+    assert_eq!(error.field(), "start[1]");
+    // Starts that no plan can serve.
+    let refused = filter.planning().unwrap().table(0.0, &case.x, &[9.0, 9.0, 3.0, 1.0], None).unwrap();
+    assert!(refused.is_err());
 }

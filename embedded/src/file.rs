@@ -42,6 +42,8 @@ pub struct Settings<B = Vec<[f64; 2]>> {
     pub sampling: Sampling,
     /// The largest ‖u − u_ref‖ of a sample, in units of u.
     pub correction_limit: f64,
+    /// Whether the search over the period is brief.
+    pub brief_search: bool,
     /// The time in s until an input acts, ≥ 0.
     pub actuation_delay: f64,
     /// The longest time in s between two steps; 0 if it is not given.

@@ -95,7 +95,7 @@ impl Size {
         let tapes = recorded::memory(plant, barriers.count, &barriers.largest, barriers.degree)?;
         let filter = Filter::memory(
             (barriers.count, plant.states()),
-            (settings.actuation_delay, settings.sampling),
+            (settings.actuation_delay, settings.sampling, settings.brief_search),
             settings.period_max > 0.0,
         );
         // The bounds are read, and handed on as two lists that grow.

@@ -4,14 +4,14 @@ use alloc::vec::Vec;
 
 use punctual_core::filter::{Filter, FilterBuilder, Status};
 use punctual_core::follower::{Follower, Following, PlanTable};
-use punctual_core::{Error, MAX_INPUTS, MAX_ROWS};
+use punctual_core::{Error, MAX_ROWS};
 use punctual_models::recorded::{PlantTape, Recording};
 
 use crate::file::{BarrierFile, FileError, Settings, content};
 use crate::memory::Size;
 
-/// A filter of a file. While its plan is followed, the plan decides, and the rows are computed for their report alone; without
-/// a plan, or once that ends or its guarantee is lost, the rows decide.
+/// A filter of a file. While its plan is followed, the plan decides, and the rows report alone; without a plan, or once that ends
+/// or its guarantee is lost, the rows decide.
 pub struct Loaded<'a> {
     /// The rows.
     pub filter: Filter,
@@ -39,18 +39,15 @@ impl Loaded<'_> {
     ///
     /// A slice of the wrong length.
     pub fn step(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<Step, Error> {
-        let report = self.filter.step(t, x, u_ref, u)?;
-        let mut step = Step { status: report.status, iterations: report.iterations, period: report.period };
-        if let Some(follower) = &mut self.follower {
-            let mut own = [0.0; MAX_INPUTS];
-            let own = &mut own[..u.len()];
-            if follower.step(t, x, u_ref, own)? == Following::Kept {
-                self.filter.replace_input(own);
-                u.copy_from_slice(own);
-                step.status = if own == u_ref { Status::Unchanged } else { Status::Filtered };
-            }
+        if let Some(follower) = &mut self.follower
+            && follower.step(t, x, u_ref, u)? == Following::Kept
+        {
+            let report = self.filter.observe(t, x, u)?;
+            let status = if u == u_ref { Status::Unchanged } else { Status::Filtered };
+            return Ok(Step { status, iterations: 0, period: report.period });
         }
-        Ok(step)
+        let report = self.filter.step(t, x, u_ref, u)?;
+        Ok(Step { status: report.status, iterations: report.iterations, period: report.period })
     }
 
     /// Whether the promise of barrier number `i` is kept, whatever u_ref comes.
@@ -103,11 +100,11 @@ pub fn read(bytes: &[u8]) -> Result<Loaded<'_>, FileError> {
     builder = builder.bounds(&min, &max).map_err(range)?;
     builder = builder.correction_limit(settings.correction_limit).map_err(range)?;
     builder = builder.actuation_delay(settings.actuation_delay).map_err(range)?;
+    builder = builder.brief_search(settings.brief_search);
     if settings.period_max != 0.0 {
         builder = builder.period_max(settings.period_max).map_err(range)?;
     }
     builder = builder.arm_after(settings.arm_after).map_err(range)?;
-    let filter = builder.sampling(settings.sampling).and_then(FilterBuilder::build).map_err(range)?;
     let (plan, _): (&[u8], _) = postcard::take_from_bytes(rest).map_err(damaged)?;
     let follower = match plan {
         [] => None,
@@ -115,8 +112,9 @@ pub fn read(bytes: &[u8]) -> Result<Loaded<'_>, FileError> {
     };
     // It is for this plant.
     let table = follower.as_ref().map(Follower::table);
-    match table.is_none_or(|table| [table.states(), table.inputs()] == size.dimensions()) {
-        true => Ok(Loaded { filter, follower, planned }),
-        false => Err(FileError::Range),
+    if table.is_some_and(|table| [table.states(), table.inputs()] != size.dimensions()) {
+        return Err(FileError::Range);
     }
+    let filter = builder.sampling(settings.sampling).and_then(FilterBuilder::build).map_err(range)?;
+    Ok(Loaded { filter, follower, planned })
 }

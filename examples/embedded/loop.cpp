@@ -30,7 +30,7 @@ int main() {
         std::printf("no filter: %d\n", static_cast<int>(filter.loaded()));
         return 1;
     }
-    state x{0.0, 0.0, 0.0, 1.0};
+    state x{0.06, -0.06, 0.02, 1.03}; // within [follower] of x0
     double nearest = std::numeric_limits<double>::infinity();
     for (unsigned tick = 0; tick < 20000; tick++) {
         input u_ref{1.5 - x[CAR_STATE_V], 2.0 * (0.2 - x[CAR_STATE_THETA])}, u{};
@@ -42,6 +42,7 @@ int main() {
         }
         punctual::report report{};
         if (filter.step(0.001 * tick, x, u_ref, u, &report) != PUNCTUAL_RESULT_OK) return 1;
+        if (report.plan != PUNCTUAL_PLAN_KEPT) return 1;
         for (std::size_t i = 1; i < filter.barriers(); i++) {
             punctual::barrier_report barrier{};
             if (filter.barrier(i, barrier) == PUNCTUAL_RESULT_OK) nearest = std::fmin(nearest, barrier.h);

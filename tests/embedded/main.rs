@@ -75,6 +75,10 @@ fn cases() -> Vec<Case> {
     }
     add("jitter", vehicle(EXPRESSED, 6, tenth, deadline, &mut draw), [0.01, 0.15], false);
     add("told", vehicle(EXPRESSED, 6, tenth, deadline, &mut draw), [0.01, 0.15], true);
+    let brief = format!("brief_search = true\n{kilohertz}");
+    add("brief_10", vehicle(EXPRESSED, 10, &brief, deadline, &mut draw), [0.001; 2], false);
+    let brief = format!("brief_search = true\n{tenth}");
+    add("brief_jitter", vehicle(EXPRESSED, 6, &brief, deadline, &mut draw), [0.01, 0.15], false);
     let keys = "sampling = \"step_size\"\nactuation_delay = 0.05\nperiod_max = 0.03\narm_after = 0.5\nexperiment = { step_size = 0.02, stop_time = 20.0 }";
     add("late", vehicle(EXPRESSED, 3, keys, "deadline = 15.0\npenalty = 5.0", &mut draw), [0.02; 2], false);
     let pointwise = "sampling = \"pointwise\"\nexperiment = { step_size = 0.01, stop_time = 20.0 }";
@@ -164,12 +168,11 @@ impl Way for Apart<'_> {
     }
 
     fn step(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Status {
-        let status = self.rows.step(t, x, u_ref, u).expect("the lengths").status;
-        let Some(follower) = &mut self.follower else { return status };
-        if follower.step(t, x, u_ref, u).expect("the lengths") != Following::Kept {
-            return status;
+        let followed = self.follower.as_mut().map(|f| f.step(t, x, u_ref, u).expect("the lengths"));
+        if followed != Some(Following::Kept) {
+            return self.rows.step(t, x, u_ref, u).expect("the lengths").status;
         }
-        self.rows.replace_input(u);
+        self.rows.observe(t, x, u).expect("the lengths");
         if u == u_ref { Status::Unchanged } else { Status::Filtered }
     }
 

@@ -42,6 +42,7 @@ struct Parts {
     slots: Vec<BarrierSlot>,
     bounds: Bounds,
     correction_limit: f64,
+    brief_search: bool,
     sampling: Sampling,
     period_max: f64,
     arm_after: f64,
@@ -63,6 +64,7 @@ impl<P, const NX: usize, const NU: usize> FilterBuilder<P, NX, NU> {
             slots: Vec::new(),
             bounds: Bounds::NONE,
             correction_limit: FilterBuilder::DEFAULT_CORRECTION_LIMIT,
+            brief_search: false,
             sampling: Sampling::default(),
             period_max: 0.0,
             arm_after: 0.0,
@@ -358,6 +360,16 @@ impl<P, const NX: usize, const NU: usize> FilterBuilder<P, NX, NU> {
         Ok(self)
     }
 
+    /// Sets whether the search for an input that meets the rows over the period is brief, for a loop whose longest step has to be
+    /// known: it takes at most 700 predictions of each barrier and 80 quadratic programs, and not some thousands. A row that needs a
+    /// longer one counts as not met, and the input is the best that was found. Promises need each step met, as always. Default:
+    /// `false`.
+    #[must_use]
+    pub fn brief_search(mut self, is_brief: bool) -> Self {
+        self.parts.brief_search = is_brief;
+        self
+    }
+
     /// Chooses how to account for inputs that are held between samples. Default: [`Sampling::Measured`].
     ///
     /// # Errors
@@ -466,7 +478,7 @@ impl Filter {
     #[doc(hidden)]
     pub fn memory(
         (barriers, states): (usize, usize),
-        (delay, sampling): (f64, Sampling),
+        (delay, sampling, brief_search): (f64, Sampling, bool),
         period_max: bool,
     ) -> usize {
         /// What an allocation takes beyond its bytes.
@@ -480,7 +492,7 @@ impl Filter {
         size_of::<Self>()
             + barriers * each
             + 3 * state
-            + rows::most(barriers, period_max) * row
+            + rows::most(barriers, period_max, rows::rounds(sampling, brief_search)) * row
             + SharedPlants::MEMORY
             + 12 * ROUNDING
     }
@@ -569,6 +581,7 @@ impl Parts {
             mut slots,
             bounds,
             correction_limit,
+            brief_search,
             sampling,
             period_max,
             arm_after,
@@ -633,7 +646,7 @@ impl Parts {
         let barriers = vec![FixedTimeState::default(); slots.len()];
         let sent = Vec::with_capacity(room_for_sent(delay, period));
         let state = FilterState { barriers, sent, ..FilterState::default() };
-        let most_rows = rows::most(slots.len(), period_max > 0.0);
+        let most_rows = rows::most(slots.len(), period_max > 0.0, rows::rounds(sampling, brief_search));
         let workspace = Workspace {
             rows: vec![Row::ZERO; most_rows],
             enforcement: vec![Enforcement::Hard { priority: 0 }; most_rows],
@@ -662,6 +675,7 @@ impl Parts {
             arm_after,
             expected: None,
             is_backed: false,
+            brief_search,
             state,
             workspace,
         };

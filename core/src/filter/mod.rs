@@ -158,6 +158,24 @@ impl Filter {
         Ok(&workspace.report)
     }
 
+    /// Remembers a sample whose input `u` something else has decided, such as a [follower](crate::follower), and reports on it:
+    /// [`Self::step`] for a filter without integrator and plans, without solving anything. The status says whether every row holds
+    /// at the sample under `u`.
+    ///
+    /// # Errors
+    ///
+    /// A slice of the wrong length.
+    pub fn observe(&mut self, t: f64, x: &[f64], u: &[f64]) -> Result<&Report, Error> {
+        let Self { rows, .. } = self;
+        rows.observe(t, x, u)?;
+        if rows.delay > 0.0 && t.is_finite() {
+            rows.workspace.next.send(t, rows.delay, u);
+        }
+        let Rows { state, workspace, .. } = rows;
+        state.take_rows(&mut workspace.next);
+        Ok(&workspace.report)
+    }
+
     /// Computes what [`Self::step`] would, without remembering the sample. With plans, the same step afterwards costs
     /// nothing.
     ///
@@ -438,17 +456,6 @@ impl Filter {
             state.clone_rows_from(next);
         }
         is_whole
-    }
-
-    /// Remembers `u` as the input of the last step in place of the one that it returned, for a filter without plans: something
-    /// else decided. Numbers above the inputs are ignored.
-    #[doc(hidden)]
-    pub fn replace_input(&mut self, u: &[f64]) {
-        let Rows { state, input_dim, .. } = &mut self.rows;
-        let sent = state.sent.last_mut().map(|sent| &mut sent.input);
-        for input in sent.into_iter().chain([&mut state.input]) {
-            input.iter_mut().zip(u).take(*input_dim).for_each(|(input, u)| *input = *u);
-        }
     }
 
     /// The report of the last [`Self::step`] or [`Self::peek`], on the input that it returned.

@@ -415,6 +415,12 @@ impl Workspace {
         self.active_len = 1;
     }
 
+    /// Forgets the last answer.
+    pub(crate) fn clear(&mut self) {
+        (self.relaxed, self.ill_conditioned) = (RowSet::EMPTY, RowSet::EMPTY);
+        self.active_len = 0;
+    }
+
     /// The active rows and bounds of the last solve, soft rows at their largest multiplier last. Empty after
     /// one row that cannot be met.
     pub fn active(&self) -> &[Active] {

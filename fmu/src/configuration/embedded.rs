@@ -69,6 +69,7 @@ impl FilterConfiguration {
             bounds: self.input_bounds()?,
             sampling: self.sampling(self.experiment.step_size),
             correction_limit: self.correction_limit,
+            brief_search: self.brief_search,
             actuation_delay: self.actuation_delay,
             period_max: self.period_max,
             arm_after: self.arm_after,

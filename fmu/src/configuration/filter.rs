@@ -73,6 +73,8 @@ pub(super) struct RawFilter {
     arm_after: f64,
     #[serde(default = "correction_limit")]
     correction_limit: f64,
+    #[serde(default)]
+    brief_search: bool,
     pub(super) plant: RawModel,
     pub(super) integrator: Option<IntegratorSection>,
     pub(super) policy: Option<BTreeMap<String, String>>,
@@ -135,6 +137,9 @@ pub struct FilterConfiguration {
     pub arm_after: f64,
     /// Largest ‖u − u_ref‖ of one sample, in units of u; a constraint that needs more is reported as `no_authority`.
     pub correction_limit: f64,
+    /// Whether the search for an input that meets the rows over the period is brief.
+    #[serde(skip_serializing_if = "is_false")]
+    pub brief_search: bool,
     /// The plant that the filter is for.
     pub plant: PlantSection,
     /// The state of the plant that the filter commands and integrates itself.
@@ -166,6 +171,11 @@ fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
 fn auto() -> AssuranceName {
     AssuranceName::Auto
 }
@@ -186,7 +196,7 @@ fn correction_limit() -> f64 {
 pub(super) static SECTION: Section = Section {
     name: "filter",
     keys: || {
-        static KEYS: [Key; 28] = [
+        static KEYS: [Key; 29] = [
             Key::new("kind", Word(&["filter"]), None, ""),
             Key::new("name", Name, Some("`filter`"), "the FMU's name"),
             Key::new("plant", Table(&model::PLANT), None, "[the model](#models) that the filter is for"),
@@ -316,6 +326,13 @@ pub(super) static SECTION: Section = Section {
                 Some("1e6"),
                 "a sample that needs a larger ‖u − u_ref‖ is `no_authority`",
             ),
+            Key::new(
+                "brief_search",
+                Flag,
+                Some("`false`"),
+                "whether the search for an input that meets the rows over a step is brief, so that the longest step can be told \
+                 ([in your control loop](embedded.md#what-it-takes)); what needs a longer one is `no_authority`",
+            ),
             Key::new("experiment", Table(&EXPERIMENT), Some(""), "[the run it is meant for](#runs)"),
             Key::new(
                 "x0",
@@ -421,6 +438,7 @@ impl FilterConfiguration {
             period_max: raw.period_max,
             arm_after: raw.arm_after,
             correction_limit: raw.correction_limit,
+            brief_search: raw.brief_search,
             plant,
             integrator: raw.integrator,
             policy: raw.policy,
@@ -736,6 +754,7 @@ impl FilterConfiguration {
         builder
             .bounds(&min, &max)
             .and_then(|b| b.correction_limit(self.correction_limit))
+            .map(|b| b.brief_search(self.brief_search))
             .and_then(|b| b.actuation_delay(self.actuation_delay))
             .and_then(|b| if self.period_max == 0.0 { Ok(b) } else { b.period_max(self.period_max) })
             .and_then(|b| b.arm_after(self.arm_after))

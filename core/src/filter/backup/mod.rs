@@ -11,6 +11,7 @@
 //! | `sample` | a sample: what is promised, whether it is kept, and which source drives the plant |
 //! | `choice` | the input: the candidates, in order |
 //! | `bears` | what a plan bears of a plant that is not the model |
+//! | `table` | a plan for a set of first states, as a table for [`crate::follower`] |
 //! | `deviation` | the observed deviation of the plant from the model |
 //! | `settings` | the numbers that decide on a guarantee |
 

@@ -1,7 +1,6 @@
 //! A plan for a set of first states as a table, for where nothing can be searched.
 
 use alloc::format;
-use alloc::vec;
 use alloc::vec::Vec;
 
 use super::settings::DECISIONS;
@@ -28,8 +27,8 @@ pub struct TabledPlan {
 impl Planning<'_> {
     /// The plan for every first state within `start` of `x`, each in its unit, as a table for a
     /// [`Follower`](crate::follower::Follower). While it is followed each input may differ from the plan's law by as much as
-    /// `freedom` says, in its unit; if `None`, by the largest part of its bounds, the same for each, for which a plan was found among
-    /// 50, 35, 20, 10, 5, 2 and 0 % of half their widths. It keeps what a first sample at `t` would promise, for every plant within
+    /// `freedom` says, in its unit; if `None`, by the largest parts of its bounds for which a plan is found among 50, 35, 20, 10, 5, 2
+    /// and 0 % of half their widths: first the same for each, then each in turn. It keeps what a first sample at `t` would promise, for every plant within
     /// what is declared, until the [horizon](super::Plans::horizon) after the last deadline, by default 3 s. Where a set moves with
     /// time, the first step of the follower has to come at `t`. Remembers nothing.
     ///
@@ -68,18 +67,32 @@ impl Planning<'_> {
                 return Err(Error::new(ErrorKind::Unsupported, field, message));
             }
         }
-        let reach = |i: usize| 0.5 * (self.bounds.max[i] - self.bounds.min[i]);
-        let tried: Vec<Vec<f64>> = match freedom {
-            Some(freedom) => vec![freedom.to_vec()],
-            None => PARTS.iter().map(|part| (0..inputs).map(|i| part * reach(i)).collect()).collect(),
-        };
-        let mut nearest = Failure::Nothing;
-        for freedom in tried {
+        let with = |freedom: Vec<f64>| {
             let of = Uncertainty { start: start.to_vec(), freedom, ..declared.clone() };
-            match (Planning { uncertainty: Some(&of), ..*self }).tabled(t, x) {
-                Ok(table) => return Ok(Ok(table)),
-                Err(failure) => nearest = failure,
+            Planning { uncertainty: Some(&of), ..*self }.tabled(t, x)
+        };
+        if let Some(freedom) = freedom {
+            return Ok(with(freedom.to_vec()));
+        }
+        let of = |part: f64, i: usize| part * 0.5 * (self.bounds.max[i] - self.bounds.min[i]);
+        let mut nearest = Failure::Nothing;
+        for (k, part) in PARTS.iter().enumerate() {
+            let mut table = match with((0..inputs).map(|i| of(*part, i)).collect()) {
+                Ok(table) => table,
+                Err(failure) => {
+                    nearest = failure;
+                    continue;
+                }
+            };
+            for i in 0..inputs {
+                let more = |part: &f64| {
+                    let mut freedom = table.freedom.clone();
+                    freedom[i] = of(*part, i);
+                    with(freedom).ok()
+                };
+                table = PARTS[..k].iter().find_map(more).unwrap_or(table);
             }
+            return Ok(Ok(table));
         }
         Ok(Err(nearest))
     }

@@ -24,6 +24,9 @@ const FEWEST: usize = 4;
 /// Number of parts of the last walk.
 const MOST: usize = 64;
 
+/// The same of a brief search.
+const MOST_BRIEF: usize = 16;
+
 /// Largest ratio of the error of a cubic anywhere to its error in the middle. If η has a fourth derivative, the ratio is
 /// less than 1; at a kink, such as the path past a small disc, it is 2. The difference of two walks gets the same factor: if
 /// they do not resolve a turn, both are off.
@@ -73,9 +76,16 @@ pub(super) struct Hold<'a> {
     pub(super) u: &'a [f64],
     /// What is subtracted from the predicted h.
     pub(super) shortfall: Option<&'a Shortfall>,
+    /// Whether the search is brief.
+    pub(super) is_brief: bool,
 }
 
 impl Hold<'_> {
+    /// Number of parts of the last walk.
+    fn most(&self) -> usize {
+        if self.is_brief { MOST_BRIEF } else { MOST }
+    }
+
     /// A lower bound on η until `to`, including narrow dips; as sharp as possible if it is negative. `None` if the source
     /// has no enclosures.
     pub(super) fn floor(&self, to: f64) -> Option<f64> {
@@ -93,7 +103,7 @@ impl Hold<'_> {
         x: &mut [f64],
     ) -> Option<Lowest> {
         let mut lowest = LARGEST;
-        for parts in SHARPER {
+        for parts in SHARPER.into_iter().filter(|parts| *parts as usize <= self.most()) {
             lowest = LARGEST;
             x.copy_from_slice(self.x);
             source.flow(x, self.u, from);
@@ -143,7 +153,7 @@ impl Hold<'_> {
                 let varies = fine[..=parts].windows(2).map(|two| (two[1].h - two[0].h).abs()).sum();
                 return self.narrow(source, [from, to], varies, scratch).or(Some(sure));
             }
-            if seen.h < 0.0 || parts == MOST {
+            if seen.h < 0.0 || parts == self.most() {
                 return Some(sure);
             }
             core::mem::swap(&mut coarse, &mut fine);

@@ -22,7 +22,7 @@ use crate::qp::{self, Bounds, Enforcement, Row};
 use crate::reach;
 pub(super) use errors::MeasurementErrors;
 pub(super) use errors::{check as check_errors, check_all as check_all_errors};
-pub(super) use sample::most;
+pub(super) use sample::{most, rounds};
 pub use search::Curvature;
 pub(super) use search::Requirement;
 pub(super) use search::Scratch;
@@ -75,12 +75,19 @@ pub(super) struct Rows {
     pub(super) expected: Option<f64>,
     /// Whether a plan backs the next step, so that the rows need not be met.
     pub(super) is_backed: bool,
+    /// Whether the search over the period is always brief.
+    pub(super) brief_search: bool,
     /// The memory of the filter, of which the rows use their part.
     pub(super) state: FilterState,
     pub(super) workspace: Workspace,
 }
 
 impl Rows {
+    /// Whether the search over the period is brief.
+    pub(super) fn is_brief(&self) -> bool {
+        self.is_backed || self.brief_search
+    }
+
     /// Whether it is certain that the input bounds do not allow h ≥ 0 of barrier number `index` at `after` s after `t` and
     /// `x`.
     pub(super) fn is_ruled_out(&self, index: usize, (t, x): (f64, &[f64]), after: f64) -> bool {

@@ -7,16 +7,28 @@ use super::{BarrierReport, Rows, SAME_PERIOD, Sampling, Status, Workspace};
 use crate::convergence::{FixedTimeState, Unmet};
 use crate::elementary;
 use crate::error::{Error, length};
-use crate::qp::{Enforcement, Outcome, Problem, Solution};
+use crate::qp::{Enforcement, Outcome, Problem, Solution, Solver};
 use crate::{MAX_INPUTS, MAX_ROWS};
 
 /// How many times at most a sample adds the instants at which its answer breaks a promise, and is solved again.
 const ROUNDS: u32 = 3;
 
-/// The most rows of a sample: for each barrier one, one at the longest step if that is `given`, and one for each time that
-/// instants are added.
-pub(crate) fn most(barriers: usize, given: bool) -> usize {
-    (barriers * (1 + usize::from(given) + ROUNDS as usize)).min(MAX_ROWS)
+/// The same of a brief search.
+const BRIEF_ROUNDS: u32 = 1;
+
+/// How many times a sample adds instants at most; never to pointwise rows.
+pub(crate) fn rounds(sampling: Sampling, is_brief: bool) -> u32 {
+    match sampling {
+        Sampling::Pointwise => 0,
+        _ if is_brief => BRIEF_ROUNDS,
+        _ => ROUNDS,
+    }
+}
+
+/// The most rows of a sample: for each barrier one, one at the longest step if that is `given`, and one for each of the `rounds`
+/// in which instants are added.
+pub(crate) fn most(barriers: usize, given: bool, rounds: u32) -> usize {
+    (barriers * (1 + usize::from(given) + rounds as usize)).min(MAX_ROWS)
 }
 
 /// Steps that search widely for an input if they do not meet a constraint: the first 8 in a row, then every 16th.
@@ -58,14 +70,8 @@ impl Moment<'_> {
 impl Rows {
     /// Takes a sample: writes its input to `u`, its report and the state after it to the workspace.
     pub(crate) fn sample(&mut self, t: f64, x: &[f64], u_ref: &[f64], u: &mut [f64]) -> Result<(), Error> {
-        length("x", x.len(), self.state_dim)?;
-        length("u_ref", u_ref.len(), self.input_dim)?;
         length("u", u.len(), self.input_dim)?;
-        self.workspace.next.clone_rows_from(&self.state);
-        self.workspace.report.reset(t);
-        self.note_start(t);
-        let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
-        if !t.is_finite() || !finite(x) || !finite(u_ref) {
+        if !self.prepare(t, x, u_ref)? {
             self.workspace.report.barriers.fill(BarrierReport::BLANK);
             self.abstain(Status::InvalidInput, u);
             return Ok(());
@@ -82,6 +88,47 @@ impl Rows {
                 let solution = self.solve(&moment, u);
                 self.report_on(&moment, solution, u);
             }
+        }
+        Ok(())
+    }
+
+    /// Clears the report, and begins the state after the sample. Returns whether all numbers are finite.
+    fn prepare(&mut self, t: f64, x: &[f64], u_ref: &[f64]) -> Result<bool, Error> {
+        length("x", x.len(), self.state_dim)?;
+        length("u_ref", u_ref.len(), self.input_dim)?;
+        self.workspace.next.clone_rows_from(&self.state);
+        self.workspace.report.reset(t);
+        self.note_start(t);
+        let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
+        Ok(t.is_finite() && finite(x) && finite(u_ref))
+    }
+
+    /// Takes a sample whose input `u` something else has decided: writes its report and the state after it to the workspace.
+    pub(crate) fn observe(&mut self, t: f64, x: &[f64], u: &[f64]) -> Result<(), Error> {
+        let is_valid = self.prepare(t, x, u)?;
+        let mut failed = (!is_valid).then_some(Status::InvalidInput);
+        if is_valid {
+            let moment = self.moment(t, x, u);
+            failed = self.rows(&moment).err();
+            if failed.is_none() {
+                self.workspace.search.clear();
+                self.workspace.qp.clear();
+                let (mut outcome, rows) = (Outcome::Optimal, &mut self.workspace.rows);
+                for (slot, row) in self.slots.iter_mut().zip(rows) {
+                    (slot.now.lowest, *row) = (None, slot.now.row);
+                    if slot.now.in_force && !row.holds(u) {
+                        outcome = Outcome::Infeasible;
+                    }
+                }
+                self.report_on(&moment, Solution { outcome, solver: Solver::Unchanged, iterations: 0 }, u);
+            }
+        } else {
+            self.workspace.report.barriers.fill(BarrierReport::BLANK);
+        }
+        if let Some(status) = failed {
+            let mut none = [0.0; MAX_INPUTS];
+            self.abstain(status, &mut none[..u.len()]);
+            self.workspace.next.input[..u.len()].copy_from_slice(u);
         }
         Ok(())
     }
@@ -171,6 +218,7 @@ impl Rows {
     /// (`docs/theory.md#between-samples`).
     fn solve(&mut self, moment: &Moment, u: &mut [f64]) -> Solution {
         let listed = self.workspace.requirements.len();
+        let rounds = rounds(self.sampling, self.brief_search);
         let (mut round, mut allowed) = (0, f64::INFINITY);
         loop {
             let solution = self.solve_once(moment, listed, u);
@@ -193,7 +241,7 @@ impl Rows {
                 let size = moment.u_ref.iter().fold(distance().max(1.0), |s: f64, r| s.max(r.abs()));
                 allowed = MUCH_FURTHER * size;
             }
-            let again = breaks && round < ROUNDS && met && self.workspace.report.predicted;
+            let again = breaks && round < rounds && met && self.workspace.report.predicted;
             if !(again && self.require_instants()) {
                 return solution;
             }
@@ -204,6 +252,7 @@ impl Rows {
     /// Solves the QP: over the period if all barriers have a row over it and a model to predict with
     /// (`docs/theory.md#prediction`), otherwise pointwise. The first `listed` requirements start from the pointwise rows.
     fn solve_once(&mut self, moment: &Moment, listed: usize, u: &mut [f64]) -> Solution {
+        let is_brief = self.is_brief();
         let Workspace { rows, enforcement, requirements, report, search, qp, .. } = &mut self.workspace;
         search.clear();
         let (bounds, correction_limit, u_ref) = (&self.bounds, self.correction_limit, moment.u_ref);
@@ -226,7 +275,7 @@ impl Rows {
                 correction_limit,
                 errors: &self.errors,
                 widens: self.state.barriers.iter().all(widens),
-                is_backed: self.is_backed,
+                is_brief,
                 curvature: self.state.curvature_before(moment.t).as_ref(),
             };
             let last = self.state.time.map(|_| &self.state.input[..u.len()]);
@@ -261,6 +310,7 @@ impl Rows {
                     x: &slot.now.from,
                     u,
                     shortfall: slot.now.shortfall.as_ref(),
+                    is_brief: self.brief_search,
                 };
                 // The first requirements are those of the barriers over the period.
                 let known = moment.period.and_then(|period| Some((period, search.predicted(i, u)?)));

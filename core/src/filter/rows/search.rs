@@ -58,8 +58,8 @@ const FAR: f64 = 8.0;
 const SIDEWAYS: f64 = 0.5;
 /// Linearisations per guess, and halvings of the way to the answer of one linearisation.
 const PATIENT: [u32; 2] = [12, 8];
-/// The same if a plan backs the step: what more of them would find is seldom better than the plan.
-const BACKED: [u32; 2] = [4, 2];
+/// The same of a brief search: what more of them would find is seldom better than a plan.
+const BRIEF: [u32; 2] = [4, 2];
 /// The part of the predicted decrease that must come true.
 const SUFFICIENT: f64 = 0.3;
 /// Largest ratio of each step of a search to the one before, for its answer to be the only one nearby.
@@ -115,8 +115,8 @@ pub(crate) struct PeriodProblem<'a> {
     pub(crate) errors: &'a MeasurementErrors,
     /// Whether to search widely for an input if the pointwise rows cannot be met either.
     pub(crate) widens: bool,
-    /// Whether a plan backs the step, so that the rows need not be met.
-    pub(crate) is_backed: bool,
+    /// Whether the search is brief: a plan backs the step, so that the rows need not be met, or it was asked for.
+    pub(crate) is_brief: bool,
     /// The curvature of the only active row of the previous sample.
     pub(crate) curvature: Option<&'a Curvature>,
 }
@@ -305,7 +305,7 @@ impl PeriodProblem<'_> {
         settled = settled && !against.is_some_and(|i| self.is_nearer_sideways(u, (i, false), &mut at));
         // Search widely if the answer is in doubt.
         let widens =
-            !self.is_backed && (self.widens || best.is_met(self.soft()) || first.outcome == Outcome::Optimal);
+            !self.is_brief && (self.widens || best.is_met(self.soft()) || first.outcome == Outcome::Optimal);
         if !settled
             && widens
             && let Some(found) = self.widen(u, &[Some(pointwise), last], &best, &mut at, qp)
@@ -396,7 +396,7 @@ impl PeriodProblem<'_> {
     }
 
     fn patience(&self) -> [u32; 2] {
-        if self.is_backed { BACKED } else { PATIENT }
+        if self.is_brief { BRIEF } else { PATIENT }
     }
 
     fn soft(&self) -> RowSet {

@@ -383,7 +383,7 @@ impl Rows {
             qp.solve(&problem, again);
         }
         let size = u.iter().fold(1.0, |s: f64, v| s.max(v.abs()));
-        let is_rough = self.is_backed || !report.status.is_satisfied();
+        let is_rough = self.is_brief() || !report.status.is_satisfied();
         let same = if is_rough { SAME_INPUT_UNMET } else { SAME_INPUT };
         let is_nearest = u.iter().zip(&*again).all(|(a, b)| (a - b).abs() <= same * size);
         // The instant at which a row is enforced moves with the sample, and no row shows this.

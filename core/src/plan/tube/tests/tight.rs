@@ -542,6 +542,24 @@ fn a_gain_that_is_ignored_is_found() {
     }
 }
 
+/// A point mass whose input uses all of its freedom, to one side or changing sides in the middle, is where a tube that ignores this
+/// is not.
+#[test]
+fn a_freedom_that_is_ignored_is_found() {
+    const FREE: f64 = 0.3;
+    let of = Uncertainty { freedom: vec![FREE, 0.0], ..exact() };
+    let reach = |fault| open_loop(PointMass, &of, ([0.0; 4], [2.0, 0.0]), 20, 0.05, fault);
+    // After a second: the place and the speed.
+    for ahead in [[0.5 * FREE, FREE], [-0.5 * FREE, -FREE], [0.25 * FREE, 0.0]] {
+        let is_in = |reach: [[f64; 2]; 4], i: usize| {
+            let most = FREE * ROUNDED;
+            (reach[2 * i][0] - most..=reach[2 * i][1] + most).contains(&ahead[i])
+        };
+        assert!((0..2).all(|i| is_in(reach(None), i)), "{ahead:?} {:?}", reach(None));
+        assert!(!is_in(reach(Some(Fault::Freedom)), 0));
+    }
+}
+
 /// A unicycle with another heading is behind its reference, by v t (1 − cos e): what first derivatives do not see.
 #[test]
 fn what_first_derivatives_leave_out_is_found() {
