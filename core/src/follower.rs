@@ -4,7 +4,7 @@
 //! the tube, and the freedom d of each input. In hold k, from t_k on, the follower applies
 //!
 //! ```math
-//! u = \min(\max(u_{\text{ref}}, \ell_k - d), \ell_k + d), \qquad \ell_k = v_k + K_k (\hat x(t_k) - z_k),
+//! u = \min(\max(u_{\text{ref}}, p_k - d), p_k + d), \qquad p_k = v_k + K_k (\hat x(t_k) - z_k),
 //! ```
 //!
 //! within the bounds. The tube was checked for every such u at every time of the hold, so that u_ref may do as it likes within

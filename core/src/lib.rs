@@ -58,7 +58,7 @@
 //!
 //! Each module uses only those above it: [`scalar`], [`jet`], [`interval`]; [`dynamics`] and [`barrier`]; [`lie`];
 //! [`convergence`] (plain numbers, no model); [`qp`] (linear algebra only); [`reach`] (what
-//! bounded inputs can do); `plan` (backup plans of a promise, a feature); [`filter`]; [`follower`] (a plan as a table). Beside it, [`barriers`] are regions
+//! bounded inputs can do); `plan` (backup plans of a promise, a feature); [`follower`] (a plan as a table); [`filter`]. Beside it, [`barriers`] are regions
 //! and limits to use, [`plants`] are vehicles, and [`judge`] says what became of a promise. Nominal controllers and the
 //! constraints of the literature are in the crate `punctual-reference`.
 //!

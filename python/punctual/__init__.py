@@ -2,6 +2,7 @@
 
 - `build` makes FMUs from dicts or TOML files, `variables` lists what an FMU has, `check` judges a configuration, `plan`
   finds the plan from a start, `to_toml` writes a dict as a file has it.
+- `run` runs a filter with its own model, without FMI.
 - `simulate` couples a filter FMU with a plant FMU in FMPy, `promise` judges a barrier there, `plot` draws it, `to_pandas`
   makes a frame of it.
 - In a dict a Python function may replace an expression: it is called once, with symbols.
@@ -22,6 +23,7 @@ from ._pandas import to_pandas
 from ._plan import plan
 from ._plot import plot
 from ._promise import Promise, promise
+from ._run import Run, run
 from ._simulate import simulate
 
 __all__ = [
@@ -35,6 +37,7 @@ __all__ = [
     "Phase",
     "Plan",
     "Promise",
+    "Run",
     "Status",
     "Step",
     "Variable",
@@ -45,6 +48,7 @@ __all__ = [
     "plan",
     "plot",
     "promise",
+    "run",
     "run_cli",
     "simulate",
     "to_pandas",

@@ -54,7 +54,7 @@ def build(
     """
     more = [] if library is None else ["--library", library]
     with configuration_file(configuration) as file:
-        _run_for([(configuration, file)], "build", file, "-o", output, *more)
+        run_for([(configuration, file)], "build", file, "-o", output, *more)
     return Path(output)
 
 
@@ -88,12 +88,12 @@ def check(
         wanted = u_ref if isinstance(u_ref, str) else ",".join(f"{n}={float(v)!r}" for n, v in u_ref.items())
         more += ["--u-ref", wanted]
         # 1: it cannot be kept from there, which the report says.
-        text = _run_for(given, "check", file, "--json", *more, accepted=(0, 1))
+        text = run_for(given, "check", file, "--json", *more, accepted=(0, 1))
     report: dict[str, Any] = json.loads(text)
     return report
 
 
-def _run_for(
+def run_for(
     given: list[tuple[Configuration, Path]],
     *arguments: str | os.PathLike[str],
     accepted: tuple[int, ...] = (0,),

@@ -71,7 +71,7 @@ def promise(result: NDArray[np.void], barrier: str, *, deadline: float | None = 
     if not prompt:
         # Outputs read at a point are those of the point before.
         time, status, h, phase, late, unmet = time[:-1], status[1:], h[1:], phase[1:], late[1:], unmet[1:]
-    rows = list(zip(time, h, phase, late, status))
+    rows = list(zip(time, h, phase, map(bool, late), status))
     said = judge(rows, own if deadline is None else deadline, units)
     abstained = range(Status.INVALID_INPUT, Status.BACKUP)
     failed = sum(n > 0 or s in abstained for n, s in zip(unmet, status))

@@ -106,7 +106,7 @@ pub fn execute(arguments: &Arguments) -> Result<ExitCode, Error> {
                     std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
                     let pictures = pictures(campaign.system(), &measures, &outcome.recording);
                     let stem = format!("{}-{run}", stem(path));
-                    write_files(&pictures, &stem, folder, &outcome.recording, arguments.units)?
+                    write_files(&pictures, &stem, folder, &outcome.recording, (arguments.units, false))?
                 }
                 None => Vec::new(),
             };

@@ -41,6 +41,9 @@ pub struct Arguments {
     /// Write a page for a browser into that folder too: verdicts, and the run as an animation with charts
     #[arg(long)]
     report: bool,
+    /// Let an arrow run along each path of the pictures, as the run does: for a page or a talk
+    #[arg(long)]
+    animate: bool,
     /// Write the unit of each column as the second line of the CSV file
     #[arg(long)]
     units: bool,
@@ -164,6 +167,7 @@ fn isolated(arguments: &Arguments) -> Result<ExitCode, Error> {
         words.extend(["--out".into(), folder.into()]);
     }
     words.extend(arguments.report.then(|| "--report".into()));
+    words.extend(arguments.animate.then(|| "--animate".into()));
     words.extend(arguments.units.then(|| "--units".into()));
     words.extend(arguments.json.then(|| "--json".into()));
     words.extend(arguments.signals.then(|| "--signals".into()));
@@ -303,7 +307,8 @@ fn here(arguments: &Arguments, mut rows: Option<File>) -> Result<ExitCode, Error
             [] => drawing::usual(&system, &models, &outcome),
             asked => asked.iter().cloned().map(Drawing::from).collect(),
         };
-        files = write_files(&usual, &stem(path), folder, &outcome.recording, arguments.units)?;
+        let how = (arguments.units, arguments.animate);
+        files = write_files(&usual, &stem(path), folder, &outcome.recording, how)?;
         if arguments.report {
             let page = folder.join(format!("{}.html", stem(path)));
             let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
@@ -399,14 +404,14 @@ fn csv_file(path: &Path, folder: &Path) -> PathBuf {
     folder.join(format!("{}.csv", stem(path)))
 }
 
-/// Writes the CSV file, with or without `units`, and the `pictures` to the existing `folder`, under names
-/// with the prefix `stem`. Returns their paths.
+/// Writes the CSV file, with or without `units`, and the `pictures`, which move or not, to the existing `folder`, under
+/// names with the prefix `stem`. Returns their paths.
 pub(super) fn write_files(
     pictures: &[Drawing],
     stem: &str,
     folder: &Path,
     recording: &Recording,
-    units: bool,
+    (units, moves): (bool, bool),
 ) -> Result<Vec<String>, Error> {
     let csv = folder.join(format!("{stem}.csv"));
     recording.save_csv(&csv, units)?;
@@ -414,7 +419,7 @@ pub(super) fn write_files(
     for (i, drawing) in pictures.iter().enumerate() {
         let name = drawing.picture.name().map_or_else(|| (i + 1).to_string(), str::to_owned);
         let file = folder.join(format!("{stem}-{name}.svg"));
-        drawing::draw(drawing, recording, &file)?;
+        drawing::draw(drawing, recording, &file, moves)?;
         files.push(file);
     }
     Ok(files.iter().map(|file| file.display().to_string()).collect())

@@ -1,4 +1,4 @@
-"""Runs the Python example of README.md, which couples a filter with a plant and says whether the promise was kept."""
+"""Runs the Python example of README.md, which runs a filter with its model and says whether the promise was kept."""
 
 import os
 import re
@@ -15,8 +15,9 @@ with tempfile.TemporaryDirectory() as folder:
     os.chdir(folder)
     names: dict = {}
     exec(compile(example, "README.md", "exec"), names)
-    result = names["result"]
-    assert result["time"][-1] == 12.0
+    run = names["run"]
+    result = run.values
+    assert run.promises["goal"]["promise"] == "kept" and result["time"][-1] == 12.0
     assert result["goal.h"][0] < 0.0 <= result["goal.h"][result["time"] >= 10.0].min()
     os.chdir("/")
 print(f"README.md: {len(lines)} lines, {len(result)} rows")

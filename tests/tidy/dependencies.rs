@@ -214,6 +214,7 @@ fn modules_of_the_core_use_modules_above_them() {
         &["convergence", "qp"],
         &["reach"],
         &["plan"],
+        &["follower"],
         &["filter"],
         &["barriers", "plants"],
         &["judge"],

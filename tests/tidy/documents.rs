@@ -122,10 +122,11 @@ fn tables_of_keys(markdown: &str) -> Vec<BTreeSet<String>> {
 }
 
 /// Beginnings of files up to an unknown key, in the order of the tables of docs/configuration.md.
-const PLACES: [&str; 23] = [
+const PLACES: [&str; 24] = [
     "kind = \"filter\"",
     "kind = \"filter\"\n[uncertainty]",
     "kind = \"filter\"\n[uncertainty.inputs.a]",
+    "kind = \"filter\"\n[follower]",
     "kind = \"filter\"\n[[barrier]]",
     "kind = \"filter\"\n[[agent]]",
     "kind = \"filter\"\n[plant]",

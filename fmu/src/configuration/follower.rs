@@ -35,7 +35,7 @@ pub(super) static SECTION: Section = Section {
             Key::new(
                 "freedom",
                 NumberByName(Of("unit of the input"), Range::NON_NEGATIVE),
-                Some("the largest part of their bounds that is found, up to 50 %"),
+                Some("the largest part of half the width of its bounds that is found, up to a half"),
                 "by how much each input may follow u_ref away from the plan, by name; 0 for those left out",
             ),
         ];

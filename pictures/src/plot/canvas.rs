@@ -5,7 +5,8 @@ use std::path::Path;
 use punctual_cosim::error::Error;
 use punctual_cosim::whole;
 use svg::node::element::{
-    Circle, ClipPath, Definitions, Group, Path as Strokes, Polygon, Polyline, Rectangle, Text,
+    AnimateTransform, Circle, ClipPath, Definitions, Group, Path as Strokes, Polygon, Polyline, Rectangle,
+    Text,
 };
 use svg::{Document, Node};
 
@@ -166,6 +167,35 @@ impl Canvas {
             .set("stroke", hex(pen.colour))
             .set("stroke-width", pen.width);
         self.add(filled(strokes, fill.0, fill.1));
+    }
+
+    /// A filled polygon around (0, 0), which points along x and goes through `places` at the `parts` of `seconds`, 0 to 1,
+    /// turned to the right by `turns` degrees each; over and over.
+    pub(super) fn moving(
+        &mut self,
+        polygon: &[Point],
+        fill: [u8; 3],
+        (places, turns): (&[Point], &[f64]),
+        (parts, seconds): (&[f64], f64),
+    ) {
+        let list = |words: &mut dyn Iterator<Item = String>| words.collect::<Vec<_>>().join(";");
+        let animated = |kind: &str, values: String| {
+            AnimateTransform::new()
+                .set("attributeName", "transform")
+                .set("type", kind)
+                .set("values", values)
+                .set("keyTimes", list(&mut parts.iter().map(|part| format!("{part:.4}"))))
+                .set("dur", format!("{seconds}s"))
+                .set("repeatCount", "indefinite")
+        };
+        let at = places.iter().map(|(x, y)| format!("{} {}", rounded(*x), rounded(*y)));
+        let turned = turns.iter().map(|turn| rounded(*turn).to_string());
+        let shape =
+            filled(Polygon::new().set("points", coordinates(polygon)), fill, 1.0).set("stroke", "#ffffff");
+        let group = Group::new()
+            .add(animated("translate", list(&mut at.into_iter())))
+            .add(Group::new().add(animated("rotate", list(&mut turned.into_iter()))).add(shape));
+        self.add(group);
     }
 
     /// A text of this size in pixels.

@@ -57,6 +57,9 @@ pub struct PathPlot {
     pub outlines: Vec<Outline>,
     /// Tubes beneath the paths, above the sets.
     pub tubes: Vec<Tube>,
+    /// The time of each point of the paths in s, ascending: an arrow then moves along each of them, over and over. Empty for a
+    /// picture that stands still.
+    pub clock: Vec<f64>,
 }
 
 /// What lies around a path: the boxes around its points, and everything between two of them.

@@ -61,8 +61,62 @@ pub(super) fn draw(plot: &PathPlot, canvas: &mut Canvas) -> Result<(), String> {
             legend::arrival_marker(canvas, at, colour(i));
         }
     }
+    if plot.clock.len() > 1 {
+        canvas.clipped(area, |canvas| {
+            for (i, path) in plot.paths.iter().enumerate() {
+                runner(canvas, &plot.clock, (&path.x, &path.y), |x, y| axes.place(x, y), colour(i));
+            }
+        });
+    }
     legend::draw(canvas, &legend, (area[2] + 18.0, area[1]));
     Ok(())
+}
+
+/// The most places of an arrow that moves; between two of them it goes straight.
+const PLACES: usize = 150;
+/// The longest time in s that a run takes in a picture; a longer one is quicker there.
+const LONGEST: f64 = 12.0;
+/// The part of that for which it stays at the end.
+const REST: f64 = 0.12;
+
+/// An arrow that moves along a path as time goes on, and points where it goes.
+fn runner(
+    canvas: &mut Canvas,
+    clock: &[f64],
+    (x, y): (&[f64], &[f64]),
+    place: impl Fn(f64, f64) -> Point,
+    colour: [u8; 3],
+) {
+    let count = clock.len().min(x.len()).min(y.len());
+    let every = count.div_ceil(PLACES).max(1);
+    let kept = (0..count).filter(|k| k % every == 0 || k + 1 == count);
+    let shown: Vec<(f64, Point)> = kept
+        .map(|k| (clock[k], place(x[k], y[k])))
+        .filter(|(_, (x, y))| x.is_finite() && y.is_finite())
+        .collect();
+    let ([(begin, _), .., (end, last)], true) = (&shown[..], shown.len() > 1) else { return };
+    if end <= begin {
+        return;
+    }
+    let run = 1.0 - REST;
+    let mut parts: Vec<f64> = shown.iter().map(|(t, _)| run * (t - begin) / (end - begin)).collect();
+    let mut places: Vec<Point> = shown.iter().map(|(_, at)| *at).collect();
+    // At rest it points where it went. No turn is by more than half a circle.
+    let mut turns: Vec<f64> = Vec::with_capacity(places.len() + 1);
+    for k in 0..places.len() {
+        let (from, to) = (places[k.saturating_sub(1)], places[(k + 1).min(places.len() - 1)]);
+        let (dx, dy) = (to.0 - from.0, to.1 - from.1);
+        let before = turns.last().copied();
+        let turn = if dx.hypot(dy) > 0.5 { dy.atan2(dx).to_degrees() } else { before.unwrap_or(0.0) };
+        let whole = before.map_or(0.0, |before| ((before - turn) / 360.0).round());
+        turns.push(turn + 360.0 * whole);
+    }
+    parts.push(1.0);
+    places.push(*last);
+    turns.extend(turns.last().copied());
+    let arrow = [(11.0, 0.0), (-8.0, -7.0), (-5.0, 0.0), (-8.0, 7.0)];
+    let seconds = ((end - begin).min(LONGEST) / run * 10.0).round() / 10.0;
+    canvas.moving(&arrow, colour, (&places, &turns), (&parts, seconds));
 }
 
 /// The most boxes of a tube that are drawn.
@@ -215,6 +269,30 @@ mod tests {
             (1, 1),
             "{svg}"
         );
+    }
+
+    #[test]
+    fn an_arrow_moves_along_each_path() {
+        let count = 1000;
+        let along = |scale: f64| (0..count).map(|k| scale * f64::from(k)).collect::<Vec<f64>>();
+        let path = |x: Vec<f64>, y: Vec<f64>| super::super::Path { x, y, ..Default::default() };
+        let paths = vec![path(along(0.01), along(0.01)), path(along(-0.01), along(0.0))];
+        let still = PathPlot { paths, ..PathPlot::default() };
+        let drawn = |plot: &PathPlot| {
+            let mut canvas = Canvas::new("test", WIDTH, HEIGHT);
+            draw(plot, &mut canvas).unwrap();
+            canvas.document()
+        };
+        assert!(!drawn(&still).contains("animateTransform"));
+        let moving = drawn(&PathPlot { clock: along(0.1), ..still });
+        assert_eq!(moving.matches("<animateTransform").count(), 4, "{moving}");
+        // As many values as times; up to the right is −45 degrees where y grows downwards, and back is 180.
+        for values in moving.split("values=\"").skip(1) {
+            let count = |text: &str| text.split('"').next().unwrap().split(';').count();
+            let times = values.split("keyTimes=\"").nth(1);
+            assert!(times.is_none_or(|times| count(times) == count(values)), "{values}");
+        }
+        assert!(moving.contains("-45;-45;-45") && moving.contains("180;180;180"), "{moving}");
     }
 
     #[test]
