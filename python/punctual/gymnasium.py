@@ -101,6 +101,9 @@ class SafetyFilterEnv(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs):
     - `filter_nominal`: the action wanted; `filter_action`: the one that was done.
     - `filter_status`: the status of the step, a `punctual.Status`.
     - `filter_guaranteed`: whether a plan keeps the promises of all barriers, whatever actions come.
+    - `filter_reason`: where plans decided on a changed action, the barrier for which, and the time in s at which it would
+      not be kept otherwise, as `Step.reason` has them; else `None`.
+    - `filter_refusal`: why there is no plan, in words; `None` where there is one, or none is asked for.
 
     The promise is one about the model of the filter: what the environment does differently, its margins have to cover.
 
@@ -156,6 +159,8 @@ class SafetyFilterEnv(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs):
             "filter_action": applied,
             "filter_status": step.status,
             "filter_guaranteed": all(barrier.guaranteed for barrier in step.barriers.values()),
+            "filter_reason": step.reason if changed else None,
+            "filter_refusal": self.filter.refusal,
         }
         return observation, reward, terminated, truncated, info
 

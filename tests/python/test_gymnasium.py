@@ -80,12 +80,28 @@ def test_actions_are_those_of_the_filter_and_info_says_so():
             assert info["filter_changed"] == (step.u[0] != action[0])
             assert info["filter_status"] is step.status
             assert info["filter_guaranteed"] is all(b.guaranteed for b in step.barriers.values()) is True
+            assert info["filter_reason"] == (step.reason if info["filter_changed"] else None)
+            reason = info["filter_reason"]
+            assert reason is None or reason[0] in {"left", "right"} and reason[1] >= k * DT
+            assert info["filter_refusal"] is None
             assert (info["filter_action"] is action) == (not info["filter_changed"])
             changed.add(info["filter_changed"])
         assert truncated
     assert changed == {True, False}
     # The second episode is the first once more: the filter has forgotten it.
     assert np.array(bare.done[:STEPS]).tobytes() == np.array(bare.done[STEPS:]).tobytes()
+
+
+def test_a_withdrawn_guarantee_is_explained():
+    # A pole that is pushed is not its model.
+    env = SafetyFilterEnv(Upright(), UPRIGHT, state=state)
+    env.reset(seed=3)
+    *_, info = env.step(np.zeros(1, np.float32))
+    assert info["filter_guaranteed"] and info["filter_refusal"] is None
+    env.unwrapped.state = np.array([0.6, 3.0])
+    env._x = state(env.unwrapped._get_obs())
+    *_, info = env.step(np.zeros(1, np.float32))
+    assert not info["filter_guaranteed"] and info["filter_refusal"]
 
 
 def test_state_and_action_may_be_scaled_and_picked():
