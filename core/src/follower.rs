@@ -131,8 +131,8 @@ impl<'a> PlanTable<'a> {
         self.number(HEAD + i)
     }
 
-    /// How far state `i` may be from the reference when hold `k` begins; for 0 the set for which the plan was made, and the
-    /// errors of measurement.
+    /// How far state `i`, as it is measured, may be from the reference when hold `k` begins; for 0, the starts for which the plan
+    /// was made.
     pub fn radius(&self, k: usize, i: usize) -> f64 {
         self.of_hold(k, 1 + self.inputs + self.states + self.states * self.inputs + i)
     }
@@ -179,7 +179,7 @@ impl<'a> PlanTable<'a> {
     pub(crate) fn write(
         tracking: &crate::plan::Tracking,
         [until, slack, origin]: [f64; 3],
-        freedom: &[f64],
+        [start, freedom]: [&[f64]; 2],
         [min, max]: [&[f64]; 2],
     ) -> alloc::vec::Vec<u8> {
         let ([states, inputs], times) = ([tracking.states()[0].len(), freedom.len()], tracking.times());
@@ -194,7 +194,8 @@ impl<'a> PlanTable<'a> {
             // A hold without feedback.
             let gain = &tracking.gains()[k];
             numbers.extend((0..states * inputs).map(|i| gain.get(i).copied().unwrap_or(0.0)));
-            numbers.extend(&tracking.radii()[k]);
+            // Who is measured within the starts is where the tube begins, beside the error; any farther, and it is not known.
+            numbers.extend(if k == 0 { start } else { &tracking.radii()[k] });
         }
         numbers.push(times[times.len() - 1] - begin);
         numbers.iter().flat_map(|number| number.to_le_bytes()).collect()

@@ -13,7 +13,7 @@ use super::{ConfigurationError, FilterConfiguration, PlantSection, Range};
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FollowerSection {
-    /// How far each state may be from `x0` at the first step, by name, in its unit; 0 for the others.
+    /// How far each state, as it is measured, may be from `x0` at the first step, by name, in its unit; 0 for the others.
     #[serde(default)]
     pub start: BTreeMap<String, f64>,
     /// By how much each input may differ from the plan's law, by name, in its unit, and 0 for the others. `None`: as much as can
@@ -30,7 +30,7 @@ pub(super) static SECTION: Section = Section {
                 "start",
                 NumberByName(Of("unit of the state"), Range::NON_NEGATIVE),
                 Some("0 each"),
-                "how far each state may be from `x0` at the first step, by name: the plan is for every such start",
+                "how far each state, as it is measured, may be from `x0` at the first step, by name: the plan is for every such start",
             ),
             Key::new(
                 "freedom",

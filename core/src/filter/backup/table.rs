@@ -25,7 +25,7 @@ pub struct TabledPlan {
 }
 
 impl Planning<'_> {
-    /// The plan for every first state within `start` of `x`, each in its unit, as a table for a
+    /// The plan for every first state that is measured within `start` of `x`, each in its unit, as a table for a
     /// [`Follower`](crate::follower::Follower). While it is followed each input may differ from the plan's law by as much as
     /// `freedom` says, in its unit; if `None`, by the largest parts of its bounds for which a plan is found among 50, 35, 20, 10, 5, 2
     /// and 0 % of half their widths: first the same for each, then each in turn. It keeps what a first sample at `t` would promise, for every plant within
@@ -111,7 +111,7 @@ impl Planning<'_> {
         // A plan beside sets at rest may begin at any time.
         let is_timed = self.rows.slots.iter().any(|slot| moves(slot, self.states, |_, _| true));
         let origin = if is_timed { t } else { f64::INFINITY };
-        let bytes = PlanTable::write(tracking, [plan.until, slack, origin], &of.freedom, bounds);
+        let bytes = PlanTable::write(tracking, [plan.until, slack, origin], [&of.start, &of.freedom], bounds);
         Ok(TabledPlan { bytes, promised, freedom: of.freedom.clone() })
     }
 }
