@@ -1,5 +1,7 @@
 //! Paths in a plane, drawn with equal axes.
 
+use punctual_core::elementary;
+
 use super::axes::Axes;
 use super::canvas::{Anchor, Canvas, INK, Pen, Point};
 use super::decimate::decimate;
@@ -107,7 +109,11 @@ fn runner(
         let (from, to) = (places[k.saturating_sub(1)], places[(k + 1).min(places.len() - 1)]);
         let (dx, dy) = (to.0 - from.0, to.1 - from.1);
         let before = turns.last().copied();
-        let turn = if dx.hypot(dy) > 0.5 { dy.atan2(dx).to_degrees() } else { before.unwrap_or(0.0) };
+        let turn = if elementary::hypot(dx, dy) > 0.5 {
+            elementary::atan2(dy, dx).to_degrees()
+        } else {
+            before.unwrap_or(0.0)
+        };
         let whole = before.map_or(0.0, |before| ((before - turn) / 360.0).round());
         turns.push(turn + 360.0 * whole);
     }
