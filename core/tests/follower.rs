@@ -149,15 +149,20 @@ fn every_start_and_every_wish_is_kept() {
     assert!(found.iter().map(|tally| tally.accepted).sum::<usize>() >= 2, "{found:?}");
 }
 
-/// A case, and its plan.
-fn planned() -> (Case, TabledPlan) {
-    let case = Case {
+/// A goal, and nothing on the way.
+fn empty() -> Case {
+    Case {
         x: [0.0, 0.0, 0.0, 1.0],
         goal: [12.0, 2.0],
         rocks: Vec::new(),
         bounds: [4.0, 1.5],
         is_point: false,
-    };
+    }
+}
+
+/// A case, and its plan.
+fn planned() -> (Case, TabledPlan) {
+    let case = empty();
     let made = table(&Unicycle, &case, &Declared::all(false)).expect("a plan");
     (case, made)
 }
@@ -241,13 +246,7 @@ fn a_guarantee_is_lost_where_it_has_to_be() {
 
 #[test]
 fn what_a_table_has_not_is_refused() {
-    let case = Case {
-        x: [0.0, 0.0, 0.0, 1.0],
-        goal: [12.0, 2.0],
-        rocks: Vec::new(),
-        bounds: [4.0, 1.5],
-        is_point: false,
-    };
+    let case = empty();
     for (declared, field) in [
         (Declared { delay: PERIOD, ..Declared::nothing() }, "actuation_delay"),
         (Declared { jitter: 0.5, ..Declared::nothing() }, "jitter"),
