@@ -255,7 +255,9 @@ fn what_a_table_has_not_is_refused() {
         let error = filter.planning().unwrap().table(0.0, &case.x, &START, None).unwrap_err();
         assert_eq!(error.field(), field);
     }
-    let filter = case.filter(Unicycle, None);
+    let mut filter = case.filter(Unicycle, None);
+    // Plans decide themselves.
+    assert_eq!(filter.observe(0.0, &case.x, &[0.0; 2]).unwrap_err().field(), "u");
     let error = filter.planning().unwrap().table(0.0, &case.x, &[-1.0, 0.0, 0.0, 0.0], None).unwrap_err();
     assert_eq!(error.field(), "start[1]");
     // Starts that no plan can serve.

@@ -164,8 +164,12 @@ impl Filter {
     ///
     /// # Errors
     ///
-    /// A slice of the wrong length.
+    /// A slice of the wrong length; a filter with an integrator or plans, which decide themselves.
     pub fn observe(&mut self, t: f64, x: &[f64], u: &[f64]) -> Result<&Report, Error> {
+        if self.counts_holds() {
+            let message = "is from elsewhere, must not be for a filter with an integrator or plans";
+            return Err(Error::new(ErrorKind::Unsupported, "u", message));
+        }
         let Self { rows, .. } = self;
         rows.observe(t, x, u)?;
         if rows.delay > 0.0 && t.is_finite() {
